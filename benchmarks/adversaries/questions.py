@@ -36,7 +36,7 @@ def random_question(seed: int | Sequence[int]) -> PlanningProblem | None:
     ends: list[FloatArray] = []
     for _ in range(2):
         places = random.uniform(floor.bounds[:2], floor.bounds[2:], (200, 2))
-        joints = random.uniform(tree.joint_lower, tree.joint_upper, (200, len(tree.joints)))
+        joints = random.uniform(tree.range_lower, tree.range_upper, (200, len(tree.joints)))
         z = np.column_stack((places, random.uniform(-pi, pi, 200), joints))
         free = z[~team.collides(z)]
         if not len(free):

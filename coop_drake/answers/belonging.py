@@ -25,7 +25,7 @@ def check_plan_belongs(plan: Plan, problem: PlanningProblem, path: Path) -> None
     """
     away = plan.goal_pose - problem.goal_pose
     away[2] = remainder(away[2], tau)
-    same_goal = plan.goal_joints == problem.goal_joints and np.abs(away).max() <= _SAME_GOAL
+    same_goal = same_goal_joints(plan, problem) and np.abs(away).max() <= _SAME_GOAL
     names = tuple(joint.name for joint in problem.tree.joints)
     digest = problem_digest(problem)
     checks = (
@@ -45,6 +45,19 @@ def check_plan_belongs(plan: Plan, problem: PlanningProblem, path: Path) -> None
             raise PlanError(
                 f"{path}: {key}: {found} is not allowed; expected the scenario's, {expected}{reason}"
             )
+
+
+def same_goal_joints(plan: Plan, problem: PlanningProblem) -> bool:
+    """Whether a plan ends at the problem's values of the joints, those without limits modulo whole turns."""
+    if len(plan.goal_joints) != len(problem.goal_joints):
+        return False
+    goals = zip(problem.tree.joints, plan.goal_joints, problem.goal_joints, strict=True)
+    return all(
+        abs(remainder(ours - theirs, tau)) <= _SAME_GOAL
+        if joint.circular and ours is not None and theirs is not None
+        else ours == theirs
+        for joint, ours, theirs in goals
+    )
 
 
 def other_age(plan: Plan, gain_set: GainSet | None) -> str:

@@ -7,7 +7,6 @@ from coop_drake.checking import plane
 from coop_drake.checking.plane import BITS, ONE, TURN, Interval, Point, demand, hull, index, numbers, points
 from coop_drake.checking.regions import read_region
 
-
 LARGEST = 1 << 20
 """No number of a document is larger [m or rad]: a circle has these limits."""
 

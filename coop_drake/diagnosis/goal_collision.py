@@ -68,7 +68,7 @@ def _least_collision(problem: PlanningProblem) -> FloatArray:
     z = at_goal(problem.goal_pose, problem.goal_joints, 0.0)
     if not free:
         return z
-    lower, upper = problem.tree.joint_lower[free], problem.tree.joint_upper[free]
+    lower, upper = problem.tree.range_lower[free], problem.tree.range_upper[free]
     columns = [3 + index for index in free]
     spread = qmc.Halton(len(free), scramble=False).random(TRIED)
     tried = []

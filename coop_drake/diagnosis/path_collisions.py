@@ -152,6 +152,8 @@ def _limits(problem: PlanningProblem, path: FloatArray) -> tuple[str, ...]:
     """Names of joints that come near a limit."""
     near = []
     for joint in problem.tree.joints:
+        if joint.circular:
+            continue
         values, near_limit = path[:, 3 + joint.index], AT_LIMIT * (joint.upper - joint.lower)
         if values.min() <= joint.lower + near_limit or values.max() >= joint.upper - near_limit:
             near.append(joint.name)

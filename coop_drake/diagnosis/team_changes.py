@@ -65,7 +65,7 @@ def shrink_into_themselves(tree: ComponentTree, names: Collection[str]) -> bool:
 def widened_joints(tree: ComponentTree, amount: float) -> ComponentTree:
     """Move both limits of every joint outwards [rad]; a revolute joint never gets more than a whole turn.
 
-    Prismatic joints get 0.25 m for every radian.
+    Prismatic joints get 0.25 m for every radian; joints without limits stay as they are.
     """
     components = tuple(
         component if component.joint is None else replace(component, joint=_widened(component.joint, amount))
@@ -75,6 +75,8 @@ def widened_joints(tree: ComponentTree, amount: float) -> ComponentTree:
 
 
 def _widened(joint: TreeJoint, amount: float) -> TreeJoint:
+    if joint.circular:
+        return joint
     if joint.kind == "prismatic":
         slide = SLIDE_PER_RADIAN * amount
         return replace(joint, lower=joint.lower - slide, upper=joint.upper + slide)

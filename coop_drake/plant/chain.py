@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from functools import partial
-from math import inf, isfinite, pi
+from math import inf, isfinite
 
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import Joint, RigidBody
@@ -67,10 +67,9 @@ def find_base(
 
 
 def limits_of(joint: Joint) -> tuple[float, float]:
-    """Limits of a joint [rad or m]; a revolute joint without limits gets half a turn each way."""
+    """Limits of a joint [rad or m], infinite where its model has none, as ``continuous`` joints of a URDF."""
     lower, upper = float(joint.position_lower_limits()[0]), float(joint.position_upper_limits()[0])
-    free = pi if joint.type_name() == "revolute" else inf
-    return (lower if lower > -_ENDLESS else -free, upper if upper < _ENDLESS else free)
+    return (lower if lower > -_ENDLESS else -inf, upper if upper < _ENDLESS else inf)
 
 
 def _check_kind(
@@ -82,7 +81,12 @@ def _check_kind(
     if kind not in MOVABLE:
         raise refuse(name, f"fixed, revolute or prismatic joints, not {kind}; or 0 {fixed}")
     lower, upper = limits_of(joint)
-    if not (isfinite(lower) and isfinite(upper)):
+    if isfinite(lower) != isfinite(upper):
+        one = f"upper limit {upper:g}" if isfinite(upper) else f"lower limit {lower:g}"
+        raise refuse(
+            name, f"two limits, or none for a revolute joint, not the {one} alone; or a value {fixed}"
+        )
+    if not isfinite(lower) and kind == "prismatic":
         raise refuse(name, f"prismatic joints with two finite limits; or a value {fixed}")
     if lower >= upper:
         raise refuse(name, f"a lower limit below the upper one, not {lower} and {upper}")

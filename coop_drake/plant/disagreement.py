@@ -26,7 +26,7 @@ def largest_disagreement(scenario: Scenario, team: TeamPlant) -> float:
     """
     tree = read_component_tree(team)
     joints = np.random.default_rng(0).uniform(
-        tree.joint_lower, tree.joint_upper, (CONFIGURATIONS, len(team.joints))
+        tree.range_lower, tree.range_upper, (CONFIGURATIONS, len(team.joints))
     )
     found = disagreement_coupling(tree, moved_bodies(scenario, team), joint_inertias(team).tolist(), joints)
     return float(found.max())

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from math import isfinite
+from math import inf, isfinite
 from pathlib import Path
 
 import numpy as np
@@ -88,12 +88,13 @@ def _judged(joint: Joint, context: Context, fixed: bool) -> SurveyedJoint:
     axis = axis_in_world(joint, context)
     planar = is_upright(axis) if kind == "revolute" else abs(float(axis[2])) <= TILT
     lower, upper = limits_of(joint)
-    endless = not (isfinite(lower) and isfinite(upper))
+    circle = kind == "revolute" and (lower, upper) == (-inf, inf)
+    endless = not (circle or (isfinite(lower) and isfinite(upper)))
     return SurveyedJoint(
         joint.name(),
         kind,
         "(" + ", ".join(f"{value + 0.0:.3g}" for value in np.round(axis, 6)) + ")",
-        f"{lower:.4g} to {upper:.4g}",
+        "no limits, a circle" if circle else f"{lower:.4g} to {upper:.4g}",
         "fixed" if fixed else "planar" if planar and not endless else "fix it",
         float(joint.GetOnePosition(context)) if fixed else min(max(0.0, lower), upper),
     )

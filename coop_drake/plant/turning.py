@@ -24,6 +24,6 @@ def turning_coupling(team: TeamPlant) -> float:
         team: A team of robots as one tree.
     """
     tree, shape = read_component_tree(team), (CONFIGURATIONS, len(team.joints))
-    joints = np.random.default_rng(0).uniform(tree.joint_lower, tree.joint_upper, shape)
+    joints = np.random.default_rng(0).uniform(tree.range_lower, tree.range_upper, shape)
     found = rate_terms(tree, bodies_of_team(team, tree), joint_inertias(team).tolist(), joints)
     return float(found[:, 1:, 0, 0].max(initial=0.0))

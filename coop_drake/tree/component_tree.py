@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from math import hypot
+from math import hypot, inf, pi
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -72,8 +72,8 @@ class TreeJoint:
         X_PJ: Pose of the joint's frame in the parent component's frame.
         sign: +1 or -1: how the plant's joint value turns the child (revolute).
         axis: Direction in J that the child moves along per unit of q, shape (2,) (prismatic).
-        lower: Lower limit [rad or m].
-        upper: Upper limit [rad or m].
+        lower: Lower limit [rad or m]; minus infinity for a revolute joint without limits, which is a circle.
+        upper: Upper limit [rad or m]; infinity for a circle.
     """
 
     name: str
@@ -85,6 +85,16 @@ class TreeJoint:
     axis: tuple[float, float]
     lower: float
     upper: float
+
+    @property
+    def circular(self) -> bool:
+        """Whether its values are those of a circle: any, and those that differ by whole turns are one."""
+        return (self.lower, self.upper) == (-inf, inf)
+
+    @property
+    def range(self) -> tuple[float, float]:
+        """Ends of an interval that holds each of its configurations: its limits, or one turn of a circle."""
+        return (-pi, pi) if self.circular else (self.lower, self.upper)
 
     @property
     def unit(self) -> str:
@@ -140,6 +150,21 @@ class ComponentTree:
     def joint_upper(self) -> FloatArray:
         """Upper joint limits, shape (n,)."""
         return np.array([joint.upper for joint in self.joints])
+
+    @cached_property
+    def circular(self) -> tuple[bool, ...]:
+        """Which axes of (theta, q...) are circles, length 1 + n: theta, and all joints without limits."""
+        return (True, *(joint.circular for joint in self.joints))
+
+    @cached_property
+    def range_lower(self) -> FloatArray:
+        """Lower ends of the joints' ranges, shape (n,): limits, or half a turn on either side of zero."""
+        return np.array([joint.range[0] for joint in self.joints])
+
+    @cached_property
+    def range_upper(self) -> FloatArray:
+        """Upper ends of the joints' ranges, shape (n,)."""
+        return np.array([joint.range[1] for joint in self.joints])
 
     @cached_property
     def ancestors(self) -> tuple[tuple[int, ...], ...]:

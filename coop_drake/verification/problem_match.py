@@ -6,6 +6,7 @@ from math import remainder, tau
 
 import numpy as np
 
+from coop_drake.answers.belonging import same_goal_joints
 from coop_drake.answers.digest import problem_digest
 from coop_drake.answers.plan import Plan
 from coop_drake.answers.problem import PlanningProblem
@@ -46,7 +47,7 @@ def check_problem(plan: Plan, problem: PlanningProblem) -> Check:
         ("start", np.array_equal(plan.start, problem.start), plan.start.tolist(), problem.start.tolist()),
         (
             "goal_joints",
-            plan.goal_joints == problem.goal_joints,
+            same_goal_joints(plan, problem),
             list(plan.goal_joints),
             list(problem.goal_joints),
         ),

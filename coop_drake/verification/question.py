@@ -34,19 +34,20 @@ def save_question(problem: PlanningProblem, path: Path | str) -> Path:
 
 
 def question_of(problem: PlanningProblem) -> dict[str, Any]:
-    """Write a planning problem down as a question for the checker: plain data for a JSON file."""
+    """Write a planning problem down as a question for the checker: plain data for a JSON file.
+
+    A joint that is a circle has null for its limits.
+    """
     tree, goals = problem.tree, problem.goal_joints
-    ends = [
-        ((j.lower, j.upper) if goal is None else (goal, goal))
-        for j, goal in zip(tree.joints, goals, strict=True)
-    ]
+    limits = [(None, None) if joint.circular else (joint.lower, joint.upper) for joint in tree.joints]
+    ends = [own if goal is None else (goal, goal) for own, goal in zip(limits, goals, strict=True)]
     angle, joints = float(problem.goal_pose[2]), len(tree.joints)
     return {
         "format": "coop_drake question",
         "version": 3,
         "floor": _region(problem.workspace),
-        "lower": [joint.lower for joint in tree.joints],
-        "upper": [joint.upper for joint in tree.joints],
+        "lower": [low for low, _ in limits],
+        "upper": [high for _, high in limits],
         "components": [_component(component) for component in tree.components if component.joint is not None],
         "pieces": [
             {"body": body.name, "component": k, "corners": shape.vertices.tolist(), "radius": shape.radius}

@@ -61,10 +61,11 @@ class AnglePanel:
         ax: Where to draw.
         axis: The joint's axis among the exploration's (theta, q...); 0 draws strips over theta alone.
         limits: Limits of that joint [rad or m], or of the strips.
+        circular: Whether the joint is a circle.
     """
 
-    def __init__(self, ax: Axes, axis: int, limits: Interval) -> None:
-        self._ax, self._axis, self._limits = ax, axis, limits
+    def __init__(self, ax: Axes, axis: int, limits: Interval, *, circular: bool = False) -> None:
+        self._ax, self._axis, self._limits, self._circular = ax, axis, limits, circular
 
     def draw_leaves(self, leaves: Sequence[Leaf], fills: Sequence[str]) -> None:
         """Fill the rectangle of every leaf with its colour."""
@@ -102,13 +103,16 @@ class AnglePanel:
     def draw_angles(self, path: Sequence[PathPiece]) -> None:
         """Draw how theta and the joint move along a channel: firm where it is proved free, dashed where not.
 
-        The line is broken where theta leaves the turn drawn.
+        The line is broken where theta, or a joint that is a circle, leaves the turn drawn.
         """
         for piece in path if self._axis else ():
             theta = THETA[0] + np.mod(piece.angles[:, 0] - THETA[0], 2 * pi)
-            jumps = np.flatnonzero(np.abs(np.diff(theta)) > pi) + 1
-            x = np.insert(theta, jumps, np.nan)
-            draw_piece(self._ax, piece, np.array([x, np.insert(piece.angles[:, self._axis], jumps, np.nan)]))
+            upright, turn = piece.angles[:, self._axis], np.abs(np.diff(theta))
+            if self._circular:
+                upright = self._limits[0] + np.mod(upright - self._limits[0], 2 * pi)
+                turn = np.maximum(turn, np.abs(np.diff(upright)))
+            jumps = np.flatnonzero(turn > pi) + 1
+            draw_piece(self._ax, piece, np.insert(np.array([theta, upright]), jumps, np.nan, axis=1))
 
     def _parts(self, slice_: Leaf | ChannelCell) -> list[list[tuple[float, float]]]:
         """Return the corners of a slice, in two parts where it crosses the end of the turn drawn."""

@@ -13,7 +13,7 @@ from shapely import Point, Polygon
 
 from coop_drake.geometry.minkowski import to_polygon
 from coop_drake.planning.cells.cell_graph import Kind
-from coop_drake.planning.cells.slices import nearest_turn
+from coop_drake.tree.circles import turns_to
 from coop_drake.tree.pose import FloatArray
 from coop_drake.watching.search_states import ChannelCell
 
@@ -31,7 +31,7 @@ class PathPiece:
     Attributes:
         kind: What is known about the cell.
         positions: Shape (k, 2), k >= 2 [m].
-        angles: (theta, q...) along it, theta unwrapped from piece to piece, shape (k, 1 + n) [rad, m].
+        angles: (theta, q...) along it, circular axes unwrapped piece by piece, shape (k, 1 + n) [rad, m].
     """
 
     kind: Kind
@@ -39,13 +39,16 @@ class PathPiece:
     angles: FloatArray
 
 
-def path_through(channel: Sequence[ChannelCell], start: FloatArray, goal: FloatArray) -> list[PathPiece]:
+def path_through(
+    channel: Sequence[ChannelCell], start: FloatArray, goal: FloatArray, circular: Sequence[bool]
+) -> list[PathPiece]:
     """Return a path from start to goal through the cells of a channel; each region meets the next.
 
     Args:
         channel: The cells.
         start: (x, y, theta, q...), shape (2 + axes,) [m, rad].
         goal: (x, y, theta, q...) at the goal; NaN for joints that are free.
+        circular: Which of (theta, q...) are circles.
     """
     pieces: list[PathPiece] = []
     polygons = [_simplified(to_polygon(cell.region.section)) for cell in channel]
@@ -55,10 +58,10 @@ def path_through(channel: Sequence[ChannelCell], start: FloatArray, goal: FloatA
             there, then = here, angles  # The channel is not complete yet.
         elif number + 1 < len(channel):
             there = _crossing(polygons[number], polygons[number + 1], here)
-            then = _shared_angles(cell, channel[number + 1], angles)
+            then = _shared_angles(cell, channel[number + 1], angles, circular)
         else:
             there, then = np.asarray(goal[:2]), np.where(np.isnan(goal[2:]), angles, goal[2:])
-            then = np.array([angles[0] + nearest_turn(then[0] - angles[0]), *then[1:]])
+            then = then + turns_to(then.tolist(), angles.tolist(), circular)
         positions = _shortest_inside(polygons[number], here, there)
         steps = np.hypot(*np.diff(positions, axis=0).T)
         fraction = np.concatenate([[0.0], np.cumsum(steps)]) / max(float(steps.sum()), 1e-12)
@@ -85,20 +88,19 @@ def _crossing(first: Polygon, second: Polygon, here: FloatArray) -> FloatArray:
     return np.asarray(nearest.coords[0])
 
 
-def _shared_angles(cell: ChannelCell, following: ChannelCell, angles: FloatArray) -> FloatArray:
-    """Return the angles in both cells' intervals nearest to ``angles``; theta on the turn nearest to it."""
+def _shared_angles(
+    cell: ChannelCell, following: ChannelCell, angles: FloatArray, circular: Sequence[bool]
+) -> FloatArray:
+    """Return the angles in both cells' intervals nearest to ``angles``, circular ones on the nearest turn."""
     result = []
+    here, there = ([0.5 * (low + high) for low, high in part.intervals] for part in (cell, following))
+    turns = turns_to(here, angles.tolist(), circular)
+    turns_there = turns_to(there, (np.array(here) + turns).tolist(), circular)
     for axis, ((a, b), (c, d)) in enumerate(zip(cell.intervals, following.intervals, strict=True)):
-        turn_a = _turn(0.5 * (a + b), float(angles[axis])) if axis == 0 else 0.0
-        turn_c = _turn(0.5 * (c + d), 0.5 * (a + b) + turn_a) if axis == 0 else 0.0
+        turn_a, turn_c = turns[axis], turns_there[axis]
         low, high = max(a + turn_a, c + turn_c), min(b + turn_a, d + turn_c)
         result.append(float(np.clip(angles[axis], min(low, high), max(low, high))))
     return np.array(result)
-
-
-def _turn(value: float, near: float) -> float:
-    """Return the whole turns that bring an angle nearest to another one."""
-    return near + nearest_turn(value - near) - value
 
 
 def _shortest_inside(polygon: Polygon, here: FloatArray, there: FloatArray) -> FloatArray:

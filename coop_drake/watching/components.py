@@ -30,17 +30,18 @@ class Components:
     others: tuple[tuple[Leaf, Region], ...]
 
 
-def components_from_start(leaves: Sequence[Leaf], start: FloatArray) -> Components:
+def components_from_start(leaves: Sequence[Leaf], start: FloatArray, circular: Sequence[bool]) -> Components:
     """Divide the over-cells of a subdivision into those that are joined to the start and the others.
 
-    The start is (x, y, theta, q...) with the joints that the subdivision has, shape (2 + axes,) [m, rad].
+    The start is (x, y, theta, q...) with the joints that the subdivision has, shape (2 + axes,) [m, rad];
+    ``circular`` says which of (theta, q...) are circles.
     """
     cells = [(leaf, region) for leaf in leaves for region in leaf.regions(Kind.MIXED)]
     angles = [float(angle) for angle in start[2:]]
     front = [
         cell
         for cell, (leaf, region) in enumerate(cells)
-        if holds(leaf.intervals, angles) and region.holds(start[:2])
+        if holds(leaf.intervals, angles, circular) and region.holds(start[:2])
     ]
     unseen = np.ones(len(cells), dtype=bool)
     unseen[front] = False
@@ -50,11 +51,12 @@ def components_from_start(leaves: Sequence[Leaf], start: FloatArray) -> Componen
         cell = front.pop()
         leaf, region = cells[cell]
         away = np.abs(middle - middle[cell])
-        away[:, 0] = np.minimum(away[:, 0], np.abs(2.0 * np.pi - away[:, 0]))
+        away = np.where(circular, np.minimum(away, np.abs(2.0 * np.pi - away)), away)
         near = unseen & (away <= half + half[cell] + _SLACK).all(axis=1)
         for other in np.flatnonzero(near).tolist():
             beside, beyond = cells[other]
-            if beside is not leaf and share_facet(leaf.intervals, beside.intervals) and region.meets(beyond):
+            adjoin = beside is not leaf and share_facet(leaf.intervals, beside.intervals, circular)
+            if adjoin and region.meets(beyond):
                 unseen[other] = False
                 front.append(other)
     return Components(

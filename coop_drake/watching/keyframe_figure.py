@@ -129,14 +129,14 @@ def _draw_angles(ax: Axes, recording: SearchRecording, frame: Keyframe, own: int
     limits = _STRIPS
     if axis:
         joint = recording.problem.tree.joints[axis - 1]
-        limits = (joint.lower, joint.upper)
+        limits = joint.range
         name = recording.axis_names[axis].replace(" ", "\n", 1)
         ax.set_ylabel(f"{name} [{joint.unit}]", fontsize=9)
     else:
         ax.set_yticks([])
     ax.set_ylim(*limits)
     leaves = cut(frame.state.leaves.values(), own, frame.cut_at)
-    panel = AnglePanel(ax, own, limits)
+    panel = AnglePanel(ax, own, limits, circular=axis > 0 and recording.problem.tree.circular[axis])
     if frame.components is not None:
         _draw_components(panel, frame.components, leaves)
         return

@@ -50,12 +50,13 @@ def keyframes(recording: SearchRecording, most: int) -> list[Keyframe]:
 
 def _keyframe(recording: SearchRecording, state: SearchState, before: Keyframe | None) -> Keyframe:
     start, goal = recording.start_of(state.robots), recording.goal_of(state.robots)
+    circular = recording.circular_of(state.robots)
     if before is not None and before.state.question != state.question:
         before = None
     if before is not None and before.state.channel is state.channel:
         path = before.path
     else:
-        path = tuple(path_through(state.channel, start, goal))
+        path = tuple(path_through(state.channel, start, goal, circular))
     if state.splits:
         cut_at = np.array([0.5 * (lower + upper) for lower, upper in state.splits[-1][0].intervals])
     else:
@@ -68,6 +69,6 @@ def _keyframe(recording: SearchRecording, state: SearchState, before: Keyframe |
         counters=counters(state),
         projection=projection_of(leaves),
         path=path,
-        components=components_from_start(leaves, start) if apart else None,
+        components=components_from_start(leaves, start, circular) if apart else None,
         cut_at=cut_at,
     )

@@ -61,6 +61,11 @@ class SearchRecording:
         joints = self.problem.tree.joints
         return [0, *[1 + joint.index for joint in joints if joint.robot in robots]]
 
+    def circular_of(self, robots: tuple[int, ...]) -> tuple[bool, ...]:
+        """Return which axes of theta and of some robots' joints are circles."""
+        circular = self.problem.tree.circular
+        return tuple(circular[axis] for axis in self.axes_of(robots))
+
     def start_of(self, robots: tuple[int, ...]) -> FloatArray:
         """Return the start (x, y, theta, q...) with some robots' joints only, shape (2 + axes,) [m, rad]."""
         return self.problem.start[[0, 1, *[2 + axis for axis in self.axes_of(robots)]]]

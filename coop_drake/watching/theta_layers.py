@@ -8,7 +8,7 @@ from math import pi
 from typing import TypeVar
 
 from coop_drake.geometry.swept_tree import Interval
-from coop_drake.planning.cells.slices import nearest_turn
+from coop_drake.tree.circles import nearest_turn
 
 THETA: Interval = (-pi / 4, 7 * pi / 4)
 """The turn of theta that is drawn [rad]; coarse slices begin and end there."""

@@ -1,4 +1,4 @@
-"""Joints without limits are circles: what has to tile a turn, who is beside whom, what is met modulo turns."""
+"""Joints without limits are circles: what tiles a turn, who is beside whom, what is met modulo turns."""
 
 import json
 from itertools import product
@@ -46,8 +46,8 @@ def tiles(splits, circles, axes=3):
         box = boxes.pop(pick % len(boxes))
         low, high = box[axis % axes]
         middle = low + (high - low) * quarters // 4
-        for part in ((low, middle), (middle, high)):
-            boxes.append([*box[: axis % axes], part, *box[axis % axes + 1 :]])
+        parts = ((low, middle), (middle, high))
+        boxes += [[*box[: axis % axes], part, *box[axis % axes + 1 :]] for part in parts]
     return boxes
 
 

@@ -11,7 +11,7 @@ def test_no_point_of_the_team_is_beyond_its_reach(data: st.DataObject) -> None:
     tree = data.draw(trees())
     random = np.random.default_rng(data.draw(st.integers(0, 1000)))
     for share in random.integers(0, 2, (20, len(tree.joints))):
-        joints = tree.joint_lower + share * (tree.joint_upper - tree.joint_lower)
+        joints = tree.range_lower + share * (tree.range_upper - tree.range_lower)
         poses = tree.poses((0.0, 0.0, 0.7, *joints))
         for X_WC, component in zip(poses, tree.components, strict=True):
             for shape in (shape for body in component.bodies for shape in body.shapes):

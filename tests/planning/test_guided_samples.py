@@ -32,12 +32,13 @@ def test_samples_of_a_large_team_are_free_more_often_component_by_component(prob
     grid = grid_for_team(problem.workspace, team)
     lower = np.array([0.0, 0.0, -np.pi, *problem.tree.joint_lower])
     upper = np.array([14.0, 20.0, np.pi, *problem.tree.joint_upper])
+    circular = np.array([False, False, *problem.tree.circular])
     spread = np.array([0.3, 0.3, *[0.0] * (len(lower) - 2)])
     guide = problem.start[None, :].astype(float)
     uniforms = np.random.default_rng(3).random((SAMPLES, 2 + len(lower)))
     free = {}
     for tries in (1, 12):
-        region = SampledRegion(guide, spread, lower, upper, 0, tries)
+        region = SampledRegion(guide, spread, lower, upper, circular, 0, tries)
         samples = np.array([draw(team, grid, region, u, 0, 0.0) for u in uniforms])
         assert (samples >= lower).all()
         assert (samples <= upper).all()

@@ -27,7 +27,7 @@ from tests.support.free_positions import FreePositions
 def base():
     problem = case("base")
     channel, _ = find_channel(problem)
-    return problem, turned_to_start(channel, problem.start[2])
+    return problem, turned_to_start(problem, channel)
 
 
 @pytest.fixture(scope="module")

@@ -159,11 +159,32 @@ def test_collision_filter_groups_exempt_pairs(tmp_path):
     assert {frozenset(pair) for pair in lost} == {frozenset(("robot_0::base", "robot_0::link_2"))}
 
 
-def test_revolute_joint_without_limits_gets_half_a_turn_each_way(tmp_path):
+def test_a_revolute_joint_without_limits_is_a_circle(tmp_path):
     arm = Arm(joints=(("revolute", "0 0 1", "<limit/>"),)).text()
     team, _builder = team_of(load_scenario(write_with_robot(tmp_path, arm)))
-    joint = read_component_tree(team).joints[0]
-    assert (joint.lower, joint.upper) == pytest.approx((-np.pi, np.pi))
+    tree = read_component_tree(team)
+    assert (tree.joints[0].lower, tree.joints[0].upper) == (-np.inf, np.inf)
+    assert tree.circular[:2] == (True, True)
+    assert tree.joints[0].range == (-np.pi, np.pi)
+
+
+def test_limits_of_half_a_turn_are_no_circle(tmp_path):
+    limits = f"<limit><lower>{-np.pi}</lower><upper>{np.pi}</upper></limit>"
+    team, _builder = team_of(
+        load_scenario(write_with_robot(tmp_path, Arm(joints=(("revolute", "0 0 1", limits),)).text()))
+    )
+    assert read_component_tree(team).circular[1] is False
+
+
+@pytest.mark.parametrize(
+    ("limit", "told"), [("<lower>-1</lower>", "lower limit -1"), ("<upper>2</upper>", "upper limit 2")]
+)
+@pytest.mark.parametrize("kind", ["revolute", "prismatic"])
+def test_a_joint_with_one_limit_is_refused_by_name(kind, limit, told, tmp_path):
+    axis = "0 0 1" if kind == "revolute" else "1 0 0"
+    arm = Arm(joints=((kind, axis, f"<limit>{limit}</limit>"),)).text()
+    with pytest.raises(ScenarioError, match=f"robot_0::joint_0.*{told} alone"):
+        team_of(load_scenario(write_with_robot(tmp_path, arm)))
 
 
 def test_bodies_without_any_geometry_are_left_out(tmp_path):

@@ -57,7 +57,7 @@ def planted(draw: st.DrawFn, robots: tuple[int, int] = (1, 3), joints: tuple[int
 
 def _corners(tree: ComponentTree, random: np.random.Generator, legs: int) -> np.ndarray:
     """Configurations without self-collision, each some way from the one before, shape (legs + 1, 3 + n)."""
-    lower, upper = tree.joint_lower, tree.joint_upper
+    lower, upper = tree.range_lower, tree.range_upper
     start = np.concatenate((np.zeros(2), random.uniform(-np.pi, np.pi, 1), 0.5 * (lower + upper)))
     corners = [start]
     for _ in range(legs):
@@ -65,7 +65,8 @@ def _corners(tree: ComponentTree, random: np.random.Generator, legs: int) -> np.
         turn = random.uniform(-np.pi, np.pi)
         z[:2] += random.uniform(0.3, 1.5) * np.array([np.cos(turn), np.sin(turn)])
         z[2] += random.uniform(-1.5, 1.5)
-        z[3:] = np.clip(z[3:] + random.uniform(-0.5, 0.5, len(lower)) * (upper - lower), lower, upper)
+        turned = z[3:] + random.uniform(-0.5, 0.5, len(lower)) * (upper - lower)
+        z[3:] = np.clip(turned, tree.joint_lower, tree.joint_upper)
         corners.append(z)
     return np.array(corners)
 

@@ -8,6 +8,7 @@ from shapely import Point, maximum_inscribed_circle
 
 from coop_drake.answers.problem import PlanningProblem
 from coop_drake.planning.boxes.channel import Channel, FreeBox
+from coop_drake.planning.execution.channel_ends import goal_values
 from tests.support.free_positions import FreePositions
 
 _POSITIONS = 200
@@ -22,8 +23,12 @@ def assert_channel_is_sound(problem: PlanningProblem, channel: Channel, samples:
     assert last.core.contains(Point(problem.goal_pose[:2]))
     assert last.lower[0] < channel.goal_angle < last.upper[0]
     assert np.isclose(np.remainder(channel.goal_angle - problem.goal_pose[2] + np.pi, 2 * np.pi), np.pi)
-    for axis, goal in enumerate(problem.goal_joints):
-        assert goal is None or last.lower[1 + axis] <= goal <= last.upper[1 + axis]
+    values = goal_values(problem, channel.goal_angle, 0.5 * (last.lower + last.upper))
+    for joint, value, asked in zip(problem.tree.joints, values[1:], problem.goal_joints, strict=True):
+        low, high = last.lower[1 + joint.index], last.upper[1 + joint.index]
+        assert value is None or low <= value <= high
+        turned = value is not None and np.isclose(np.remainder(value - asked + np.pi, 2 * np.pi), np.pi)
+        assert value == asked or (joint.circular and turned)
     for one, other in zip(channel.boxes[:-1], channel.boxes[1:], strict=True):
         assert np.all(np.minimum(one.upper, other.upper) - np.maximum(one.lower, other.lower) > 1e-6)
         assert maximum_inscribed_circle(one.core.intersection(other.core), tolerance=1e-4).length > 1e-4

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import pi
+from math import inf, pi
 
 import numpy as np
 from hypothesis import strategies as st
@@ -101,7 +101,9 @@ def _joints(draw: st.DrawFn, name: str, robot: int, index: int, X_PJ: PlanarPose
     axis = (draw(st.sampled_from((1.0, -0.5, 0.0))), draw(st.sampled_from((0.3, 1.0))))
     sign = draw(st.sampled_from((1.0, -1.0)))
     limits = (
-        draw(st.sampled_from(((-1.9, 1.9), (-pi, pi), (0.0, 2.8)))) if kind == "revolute" else (-0.4, 0.4)
+        draw(st.sampled_from(((-1.9, 1.9), (-pi, pi), (0.0, 2.8), (-inf, inf))))
+        if kind == "revolute"
+        else (-0.4, 0.4)
     )
     return TreeJoint(name, kind, robot, index, X_PJ, sign, axis, *limits)
 
@@ -112,7 +114,7 @@ def slices_of(draw: st.DrawFn, tree: ComponentTree) -> tuple[tuple[float, float]
 
     Half of them are as halving makes them: their ends are round, and sides of swept bodies become parallel.
     """
-    limits = [(-0.25 * pi, 1.75 * pi), *[(joint.lower, joint.upper) for joint in tree.joints]]
+    limits = [(-0.25 * pi, 1.75 * pi), *[joint.range for joint in tree.joints]]
     if draw(st.booleans()):
         return tuple(_halved(*ends, draw(st.integers(0, 10)), draw(st.floats(0.0, 0.999))) for ends in limits)
     widest = draw(st.sampled_from((0.0, 1e-4, 0.02, 0.2, 0.8, 3.0, 2.0 * pi)))

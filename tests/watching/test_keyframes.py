@@ -11,7 +11,8 @@ from shapely import LineString, union_all
 
 from coop_drake.geometry.minkowski import to_polygon
 from coop_drake.planning.cells.cell_graph import Kind
-from coop_drake.planning.cells.slices import holds, nearest_turn, share_facet
+from coop_drake.planning.cells.slices import holds, share_facet
+from coop_drake.tree.circles import nearest_turn
 from coop_drake.watching import keyframes, record_search
 from coop_drake.watching.angle_panels import cut
 from coop_drake.watching.projections import projection_of
@@ -44,7 +45,9 @@ def test_a_proof_shows_two_parts_that_never_touch_with_start_and_goal_in_differe
 
     def members(end, part):
         return [
-            leaf for leaf, region in part if holds(leaf.intervals, [float(end[2])]) and region.holds(end[:2])
+            leaf
+            for leaf, region in part
+            if holds(leaf.intervals, [float(end[2])], (True,)) and region.holds(end[:2])
         ]
 
     assert members(start, parts.reached)
@@ -53,7 +56,7 @@ def test_a_proof_shows_two_parts_that_never_touch_with_start_and_goal_in_differe
     assert not members(goal, parts.reached)
     for leaf, region in parts.reached:
         for other, beyond in parts.others:
-            neighbours = leaf.slice != other.slice and share_facet(leaf.intervals, other.intervals)
+            neighbours = leaf.slice != other.slice and share_facet(leaf.intervals, other.intervals, (True,))
             assert not (neighbours and region.meets(beyond))
     mixed = sum(len(leaf.regions(Kind.MIXED)) for leaf in frames[-1].state.leaves.values())
     assert len(parts.reached) + len(parts.others) == mixed
@@ -75,7 +78,7 @@ def test_the_line_runs_from_start_to_goal_inside_the_cells_of_the_channel(found)
         # Outlines are straightened by a centimetre before lines are drawn round their corners.
         assert to_polygon(cell.region.section).buffer(0.011).covers(LineString(piece.positions))
         for theta in piece.angles[:, 0]:
-            assert holds(cell.intervals, [theta])
+            assert holds(cell.intervals, [theta], (True,))
 
 
 def test_projections_are_the_unions_of_the_cells_and_do_not_overlap(found):

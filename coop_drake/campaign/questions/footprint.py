@@ -39,7 +39,7 @@ def free_goals(problem: PlanningProblem, check: Callable[..., bool], count: int,
         seed: Seed of the random joints.
     """
     random = np.random.default_rng(seed)
-    lower, upper = problem.tree.joint_lower, problem.tree.joint_upper
+    lower, upper = problem.tree.range_lower, problem.tree.range_upper
     fixed = np.array([np.nan if value is None else value for value in problem.goal_joints], dtype=float)
     goals: list[FloatArray] = []
     for _ in range(_TRIES_PER_GOAL * count):

@@ -29,8 +29,8 @@ def narrowest_corridor(tree: ComponentTree, random: np.random.Generator) -> floa
         tree: The team.
         random: Source of the samples.
     """
-    lower = np.array([0.0, 0.0, -np.pi, *tree.joint_lower])
-    upper = np.array([0.0, 0.0, np.pi, *tree.joint_upper])
+    lower = np.array([0.0, 0.0, -np.pi, *tree.range_lower])
+    upper = np.array([0.0, 0.0, np.pi, *tree.range_upper])
     return float(_narrowest(tree.arrays, lower, upper, random, _DRAWN, _REFINED))
 
 

@@ -143,7 +143,7 @@ def _space(problem: PlanningProblem, scale: FloatArray) -> ob.CompoundStateSpace
     joints = [
         _interval_space([lower * unit], [upper * unit])
         for lower, upper, unit in zip(
-            problem.tree.joint_lower, problem.tree.joint_upper, scale[3:], strict=True
+            problem.tree.range_lower, problem.tree.range_upper, scale[3:], strict=True
         )
     ]
     whole = ob.CompoundStateSpace()

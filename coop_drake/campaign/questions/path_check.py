@@ -35,13 +35,13 @@ def fault_of(problem: PlanningProblem, path: FloatArray) -> str:
         problem: The question.
         path: Configurations, theta unwrapped, shape (m, 3 + n).
     """
-    if not _same(path[0], problem.start):
+    if not _same(problem, path[0], problem.start):
         return "it does not begin at the start"
     goal = [
         value if asked is None else asked
         for value, asked in zip(path[-1], (*problem.goal_pose, *problem.goal_joints), strict=True)
     ]
-    if not _same(path[-1], np.array(goal)):
+    if not _same(problem, path[-1], np.array(goal)):
         return "it does not end at the goal"
     joints, tree = path[:, 3:], problem.tree
     if (joints < tree.joint_lower - _ARRIVED).any() or (joints > tree.joint_upper + _ARRIVED).any():
@@ -55,10 +55,10 @@ def fault_of(problem: PlanningProblem, path: FloatArray) -> str:
     return _exact_fault(problem, _densified(path, scale, _EXACT))
 
 
-def _same(first: FloatArray, second: FloatArray) -> bool:
-    away = first - second
-    away[2] = remainder(away[2], 2.0 * pi)
-    return bool(np.abs(away).max() <= _ARRIVED)
+def _same(problem: PlanningProblem, first: FloatArray, second: FloatArray) -> bool:
+    turns = zip(first - second, (False, False, *problem.tree.circular), strict=True)
+    away = [abs(remainder(off, 2.0 * pi)) if circular else abs(off) for off, circular in turns]
+    return max(away) <= _ARRIVED
 
 
 def _densified(path: FloatArray, scale: FloatArray, step: float) -> FloatArray:

@@ -149,7 +149,7 @@ def _free(
     found = 0
     for _ in range(_TRIES):
         position = random.uniform(region.bounds[:2], region.bounds[2:])
-        joints = random.uniform(tree.joint_lower, tree.joint_upper)
+        joints = random.uniform(tree.range_lower, tree.range_upper)
         z = np.array([*position, random.uniform(-np.pi, np.pi), *joints]).round(_DIGITS)
         inside = shapely.contains_xy(region, *position)
         if inside and found < count and is_free(team, grid, z, _GAP):

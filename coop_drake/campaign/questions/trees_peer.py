@@ -36,8 +36,8 @@ def run_trees(problem: PlanningProblem, seeds: Sequence[int], checks: int = CHEC
     team, scale, check = tree.arrays, configuration_scale(tree), prepared_check(problem)
     grid = grid_for_team(problem.workspace, team)
     x_lower, y_lower, x_upper, y_upper = problem.workspace.bounds
-    lower = np.array([x_lower, y_lower, -np.pi, *tree.joint_lower])
-    upper = np.array([x_upper, y_upper, np.pi, *tree.joint_upper])
+    lower = np.array([x_lower, y_lower, -np.pi, *tree.range_lower])
+    upper = np.array([x_upper, y_upper, np.pi, *tree.range_upper])
     start = problem.start.astype(float)
 
     def attempt(seed: int, budget: int) -> PeerRun:

@@ -12,13 +12,13 @@ from shapely import MultiPolygon, Polygon
 from coop_drake.answers.problem import PlanningProblem
 from coop_drake.geometry.body_pairs import BodyPairs
 from coop_drake.geometry.minkowski import FreeSpace, to_polygon
-from coop_drake.geometry.swept_tree import Interval, Intervals, SweptTree
+from coop_drake.geometry.swept_tree import Intervals, SweptTree
 from coop_drake.planning.boxes.certify import PathBox
 from coop_drake.planning.boxes.channel import Channel, FreeBox
 from coop_drake.planning.cells.cells import CellMaker, Region, regions_of
-from coop_drake.planning.cells.slices import nearest_turn
 from coop_drake.planning.questions.floor_near import nearby
 from coop_drake.planning.questions.margins import disc_polygon, is_patched, marginal_workspace
+from coop_drake.tree.circles import nearest_turn, turns_to
 from coop_drake.tree.pose import FloatArray
 
 MANY_COORDINATES = 150
@@ -94,17 +94,25 @@ def _joined(regions: Sequence[Region], box: PathBox) -> Region | None:
     return next((region for region in regions if region.depths(ends).min() > 0.0), None)
 
 
-def unwrapped(intervals: Sequence[Intervals], start_angle: float) -> list[Intervals]:
-    """Shift every theta interval by whole turns so that consecutive ones lie next to each other."""
+def unwrapped(
+    intervals: Sequence[Intervals], start: Sequence[float], circular: Sequence[bool]
+) -> list[Intervals]:
+    """Shift boxes by whole turns along circular axes so that consecutive ones lie next to each other.
+
+    Args:
+        intervals: Intervals of (theta, q...) of every box.
+        start: Values of (theta, q...) that the first one lies next to, length 1 + n [rad, m].
+        circular: Which of these axes are circles.
+    """
     result: list[Intervals] = []
-    near = start_angle
+    near = list(start)
     for box in intervals:
-        lower, upper = box[0]
-        centre = 0.5 * (lower + upper)
-        shift = near + nearest_turn(centre - near) - centre
-        moved: Interval = (lower + shift, upper + shift)
-        result.append((moved, *box[1:]))
-        near = centre + shift
+        centres = [0.5 * (lower + upper) for lower, upper in box]
+        shifts = turns_to(centres, near, circular)
+        result.append(
+            tuple((a + shift, b + shift) for (a, b), shift in zip(box, shifts.tolist(), strict=True))
+        )
+        near = [centre + shift for centre, shift in zip(centres, shifts.tolist(), strict=True)]
     return result
 
 
@@ -119,7 +127,8 @@ def make_channel(
         margin: The margin that the cores keep [m].
         path: The path that they were laid along, shape (m, 3 + n); None if there is none.
     """
-    turned = unwrapped([box.intervals for box in boxes], float(problem.start[2]))
+    start = problem.start[2:].tolist()
+    turned = unwrapped([box.intervals for box in boxes], start, problem.tree.circular)
     free = tuple(
         FreeBox(
             polygon=to_polygon(box.full.section),

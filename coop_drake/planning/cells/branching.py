@@ -99,10 +99,11 @@ class StrongBranching:
         """Whether a part touches the path's cell at a place, or holds the start or goal beyond its ends."""
         if 0 <= place < len(path):
             other = path[place]
-            beside = share_facet(part.intervals, self._slices.all[other.slice].intervals)
+            intervals = self._slices.all[other.slice].intervals
+            beside = share_facet(part.intervals, intervals, self._slices.circular)
             return beside and part.region.meets(other.region)
         angles, position = self._start if place < 0 else self._goal
-        return holds(part.intervals, angles) and part.region.holds(position)
+        return holds(part.intervals, angles, self._slices.circular) and part.region.holds(position)
 
 
 def _joined(parts: Sequence[_Part], first: Sequence[bool], last: Sequence[bool]) -> bool:

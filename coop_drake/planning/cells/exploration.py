@@ -243,9 +243,9 @@ class Exploration(Subdivision):
         """Record which cells of a new leaf hold the start and which hold the goal."""
         cells = self.graph.by_slice[index]
         start, goal = self._problem.start, self._problem.goal_pose
-        if holds(intervals, [float(angle) for angle in start[2:]]):
+        if holds(intervals, [float(angle) for angle in start[2:]], self.slices.circular):
             self._starts[index] = [cell for cell in cells if cell.region.holds(start[:2])]
-        if holds(intervals, [float(goal[2]), *self._problem.goal_joints]):
+        if holds(intervals, [float(goal[2]), *self._problem.goal_joints], self.slices.circular):
             self._goals[index] = [cell.index for cell in cells if cell.region.holds(goal[:2])]
 
 

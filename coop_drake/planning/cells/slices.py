@@ -1,4 +1,7 @@
-"""Compound slices, eq. (7): boxes of intervals in (theta, q...), halved one by one, with their neighbours."""
+"""Compound slices, eq. (7): boxes of intervals in (theta, q...), halved one by one, with their neighbours.
+
+Circular axes (theta, and joints without limits) have a turn of values: their first and last slices meet.
+"""
 
 from __future__ import annotations
 
@@ -7,6 +10,7 @@ from dataclasses import dataclass, field
 from math import pi
 
 from coop_drake.geometry.swept_tree import Interval, Intervals
+from coop_drake.tree.circles import nearest_turn
 from coop_drake.tree.component_tree import ComponentTree
 
 TOUCH = 1e-9
@@ -36,11 +40,12 @@ class Slice:
 class Slices:
     """A cover of all angles by slices, each split on its own.
 
-    Theta is periodic. Its first four slices are centred at 0, pi/2, pi and 3 pi/2, because the team often
-    moves along walls that are parallel to the axes: these angles then lie inside slices, not between them.
+    The first four slices of theta are centred at 0, pi/2, pi and 3 pi/2, because the team often moves along
+    walls that are parallel to the axes: these angles then lie inside slices, not between them. A joint that
+    is a circle begins with one slice, from -pi to pi.
 
     Args:
-        tree: Gives the joints' limits.
+        tree: Gives the joints' limits, and which of them are circles.
         overlap: Overlap of neighbours as a fraction of their width, used for under-cells only.
         printed: Whether to begin with one slice of everything, and to call slices neighbours that share only
             a corner or an edge, as the paper does.
@@ -48,12 +53,13 @@ class Slices:
 
     def __init__(self, tree: ComponentTree, overlap: float, *, printed: bool = False) -> None:
         self._overlap, self._printed = overlap, printed
-        self._limits = tuple((joint.lower, joint.upper) for joint in tree.joints)
-        self.axis_widths = (2.0 * pi, *(upper - lower for lower, upper in self._limits))
+        self._limits, self.circular = tuple((j.lower, j.upper) for j in tree.joints), tree.circular
+        ranges = tuple(joint.range for joint in tree.joints)
+        self.axis_widths = (2.0 * pi, *(upper - lower for lower, upper in ranges))
         count = 1 if printed else FIRST_THETA_SLICES
         part = 2.0 * pi / count
         self.all: list[Slice] = [
-            Slice((((i - 0.5) * part, (i + 0.5) * part), *self._limits), 0) for i in range(count)
+            Slice((((i - 0.5) * part, (i + 0.5) * part), *ranges), 0) for i in range(count)
         ]
         for i in range(count):
             self.all[i].neighbours |= {(i - 1) % count, (i + 1) % count} - {i}
@@ -80,7 +86,7 @@ class Slices:
         return ids
 
     def _adjacent(self, first: Intervals, second: Intervals) -> bool:
-        touches = _touches(first, second)
+        touches = _touches(first, second, self.circular)
         return touches is not None and (self._printed or touches <= 1)
 
     def expanded(self, intervals: Intervals) -> Intervals:
@@ -95,7 +101,7 @@ class Slices:
 
     def holding(self, angles: Sequence[float | None]) -> list[int]:
         """Leaves whose closed nominal intervals hold the angles (theta, q...); None is not tested."""
-        return [i for i in self.leaves() if holds(self.all[i].intervals, angles)]
+        return [i for i in self.leaves() if holds(self.all[i].intervals, angles, self.circular)]
 
 
 def halves(intervals: Intervals, axis: int) -> tuple[Intervals, Intervals]:
@@ -106,21 +112,16 @@ def halves(intervals: Intervals, axis: int) -> tuple[Intervals, Intervals]:
     return (*before, (lower, middle), *after), (*before, (middle, upper), *after)
 
 
-def holds(intervals: Intervals, angles: Sequence[float | None]) -> bool:
-    """Whether intervals hold (theta, q...), theta modulo 2 pi; an angle None is not tested."""
-    for axis, (angle, (lower, upper)) in enumerate(zip(angles, intervals, strict=True)):
+def holds(intervals: Intervals, angles: Sequence[float | None], circular: Sequence[bool]) -> bool:
+    """Whether intervals hold (theta, q...), on circular axes modulo 2 pi; an angle None is not tested."""
+    for angle, (lower, upper), periodic in zip(angles, intervals, circular, strict=True):
         if angle is None:
             continue
         centre, half = 0.5 * (lower + upper), 0.5 * (upper - lower)
-        offset = nearest_turn(angle - centre) if axis == 0 else angle - centre
+        offset = nearest_turn(angle - centre) if periodic else angle - centre
         if abs(offset) > half + TOUCH:
             return False
     return True
-
-
-def nearest_turn(angle: float) -> float:
-    """The same angle modulo 2 pi in [-pi, pi)."""
-    return (angle + pi) % (2.0 * pi) - pi
 
 
 def interval_overlap(first: Interval, second: Interval, periodic: bool = False) -> float:
@@ -129,24 +130,28 @@ def interval_overlap(first: Interval, second: Interval, periodic: bool = False) 
     Args:
         first: One interval.
         second: The other interval.
-        periodic: Whether they are intervals of theta, modulo 2 pi.
+        periodic: Whether they are intervals of a circular axis, modulo 2 pi.
     """
     halves = 0.5 * (first[1] - first[0] + second[1] - second[0])
     offset = 0.5 * (first[0] + first[1] - second[0] - second[1])
     return halves - abs(nearest_turn(offset) if periodic else offset)
 
 
-def share_facet(first: Intervals, second: Intervals) -> bool:
-    """Whether two boxes share a facet: they overlap in all axes but at most one, in which they touch."""
-    touches = _touches(first, second)
+def share_facet(first: Intervals, second: Intervals, circular: Sequence[bool]) -> bool:
+    """Whether two boxes share a facet: they overlap in all axes but at most one, in which they touch.
+
+    Intervals of circular axes, whatever their widths, touch or overlap in any of the places that whole turns
+    lead to.
+    """
+    touches = _touches(first, second, circular)
     return touches is not None and touches <= 1
 
 
-def _touches(first: Intervals, second: Intervals) -> int | None:
+def _touches(first: Intervals, second: Intervals, circular: Sequence[bool]) -> int | None:
     """Number of axes in which two boxes touch without overlap; None if there is a gap in some axis."""
     touches = 0
-    for axis, (a, b) in enumerate(zip(first, second, strict=True)):
-        shared = interval_overlap(a, b, periodic=axis == 0)
+    for a, b, periodic in zip(first, second, circular, strict=True):
+        shared = interval_overlap(a, b, periodic)
         if shared < -TOUCH:
             return None
         touches += shared <= TOUCH

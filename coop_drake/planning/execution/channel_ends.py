@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from math import inf, tau
 
@@ -11,6 +12,7 @@ from shapely import Point
 from coop_drake.answers.problem import PlanningProblem
 from coop_drake.errors import PlanError
 from coop_drake.planning.boxes.channel import Channel
+from coop_drake.tree.circles import nearest_turn
 from coop_drake.tree.pose import FloatArray
 
 GOAL_FRACTION = 0.9
@@ -20,15 +22,31 @@ Bounds = tuple[FloatArray, FloatArray]
 """Lower and upper ends of (theta, q...), shape (1 + n,) each [rad, m]."""
 
 
-def final_intervals(problem: PlanningProblem, goal_angle: float) -> Bounds:
-    """Intervals of (theta, q...) in which the goal is reached; infinite for joints that are free there.
+def goal_values(problem: PlanningProblem, goal_angle: float, near: FloatArray) -> tuple[float | None, ...]:
+    """Values of (theta, q...) at the goal, None for joints that are free there.
 
     Args:
         problem: What was asked.
         goal_angle: The goal's theta, unwrapped [rad].
+        near: Values of (theta, q...) that the goals of joints without limits are turned to, shape (1 + n,).
     """
-    goals: list[tuple[float | None, float]] = [(goal_angle, problem.angle_tolerance)]
-    goals += [(goal, problem.joint_tolerance) for goal in problem.goal_joints]
+    joints = zip(problem.tree.joints, problem.goal_joints, near[1:].tolist(), strict=True)
+    turned = (
+        value + nearest_turn(goal - value) if joint.circular and goal is not None else goal
+        for joint, goal, value in joints
+    )
+    return (goal_angle, *turned)
+
+
+def final_intervals(problem: PlanningProblem, values: Sequence[float | None]) -> Bounds:
+    """Intervals of (theta, q...) in which the goal is reached; infinite for joints that are free there.
+
+    Args:
+        problem: What was asked.
+        values: The values there, see ``goal_values``.
+    """
+    tolerances = (problem.angle_tolerance, *[problem.joint_tolerance] * len(problem.goal_joints))
+    goals = list(zip(values, tolerances, strict=True))
     lower = [-inf if goal is None else goal - GOAL_FRACTION * tolerance for goal, tolerance in goals]
     upper = [inf if goal is None else goal + GOAL_FRACTION * tolerance for goal, tolerance in goals]
     return np.array(lower), np.array(upper)
@@ -45,7 +63,7 @@ def goal_intervals(problem: PlanningProblem, channel: Channel, index: int) -> Bo
         following = channel.boxes[index + 1]
         lower, upper = np.maximum(lower, following.lower), np.minimum(upper, following.upper)
     else:
-        goals = final_intervals(problem, channel.goal_angle)
+        goals = final_intervals(problem, goal_values(problem, channel.goal_angle, 0.5 * (lower + upper)))
         lower, upper = np.maximum(lower, goals[0]), np.minimum(upper, goals[1])
     if not (lower < upper).all():
         axis = int(np.argmin(lower < upper))
@@ -57,12 +75,11 @@ def goal_intervals(problem: PlanningProblem, channel: Channel, index: int) -> Bo
     return lower, upper
 
 
-def turned_to_start(channel: Channel, start_angle: float) -> Channel:
-    """Shift theta of all boxes by full turns so that the first one holds the start's angle."""
+def turned_to_start(problem: PlanningProblem, channel: Channel) -> Channel:
+    """Shift circular axes of all boxes by full turns so that the first one holds the start's angles."""
     first = channel.boxes[0]
-    turns = round((start_angle - 0.5 * (first.lower[0] + first.upper[0])) / tau)
-    shift = np.zeros_like(first.lower)
-    shift[0] = turns * tau
+    turns = np.rint((problem.start[2:] - 0.5 * (first.lower + first.upper)) / tau)
+    shift = np.where(problem.tree.circular, turns * tau, 0.0)
     boxes = tuple(replace(box, lower=box.lower + shift, upper=box.upper + shift) for box in channel.boxes)
     path = None if channel.path is None else channel.path + np.concatenate([[0.0, 0.0], shift])
     return replace(channel, boxes=boxes, goal_angle=channel.goal_angle + shift[0], path=path)

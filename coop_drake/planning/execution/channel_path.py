@@ -10,7 +10,7 @@ import shapely
 from coop_drake.answers.problem import PlanningProblem
 from coop_drake.geometry.passage import PassageFinder
 from coop_drake.planning.boxes.channel import Channel
-from coop_drake.planning.execution.channel_ends import goal_intervals
+from coop_drake.planning.execution.channel_ends import goal_intervals, goal_values
 from coop_drake.planning.execution.targets import choose_targets
 from coop_drake.tree.pose import FloatArray
 
@@ -36,7 +36,7 @@ def path_through(
         lower, upper = goal_intervals(problem, channel, index)
         aim = 0.5 * (lower + upper)
         if index + 1 == len(channel.boxes):
-            goals = (channel.goal_angle, *problem.goal_joints)
+            goals = goal_values(problem, channel.goal_angle, aim)
             nearest = np.clip(axes, lower, upper)
             aim = np.array(
                 [near if goal is None else goal for near, goal in zip(nearest, goals, strict=True)]

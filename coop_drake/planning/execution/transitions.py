@@ -22,7 +22,13 @@ from coop_drake.geometry.tidy import tidy_cell
 from coop_drake.laws import GainSet, ScheduledGains, TransitionGains, transition_gains
 from coop_drake.planning.boxes.channel import Channel, FreeBox
 from coop_drake.planning.execution.acceleration_limits import check_accelerations, planned_accelerations
-from coop_drake.planning.execution.channel_ends import Bounds, check_ends, goal_intervals, turned_to_start
+from coop_drake.planning.execution.channel_ends import (
+    Bounds,
+    check_ends,
+    goal_intervals,
+    goal_values,
+    turned_to_start,
+)
 from coop_drake.planning.execution.estimate import plan_time, timed
 from coop_drake.planning.execution.refusals import GOAL_REGION_FRACTION
 from coop_drake.planning.execution.speed_shares import limits_of, speed_shares, stated_speeds
@@ -61,7 +67,7 @@ def make_plan(
         PlanError: If the channel does not join the start to the goal.
         StallError: If a passage is too narrow or too slow to be executed; names it.
     """
-    channel = turned_to_start(channel, problem.start[2])
+    channel = turned_to_start(problem, channel)
     start, goal = problem.start[:2], problem.goal_pose[:2]
     check_ends(problem, channel)
     if targets is None:
@@ -83,7 +89,7 @@ def make_plan(
         transitions=tuple(transitions),
         start=problem.start.copy(),
         goal_pose=np.array([*goal, channel.goal_angle]),
-        goal_joints=problem.goal_joints,
+        goal_joints=goal_values(problem, channel.goal_angle, resting)[1:],
         joint_names=tuple(joint.name for joint in problem.tree.joints),
         gain_set=gain_set_name,
         problem=problem_digest(problem),

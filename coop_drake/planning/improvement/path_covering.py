@@ -19,12 +19,12 @@ from coop_drake.planning.boxes.box_sweeps import BoxArrays
 from coop_drake.planning.boxes.boxes import Regions
 from coop_drake.planning.boxes.certify import PathBox, box_arrays
 from coop_drake.planning.boxes.channel import Channel, FreeBox
-from coop_drake.planning.cells.slices import nearest_turn
-from coop_drake.planning.execution.channel_ends import final_intervals
+from coop_drake.planning.execution.channel_ends import final_intervals, goal_values
 from coop_drake.planning.improvement.box_choice import choose_boxes
 from coop_drake.planning.improvement.box_sequences import Waypoints
 from coop_drake.planning.questions.margins import shrunk
 from coop_drake.planning.sampling.obstacle_grid import ObstacleGrid, grid_inside
+from coop_drake.tree.circles import nearest_turn
 from coop_drake.tree.pose import FloatArray
 
 LENGTH_STEP, ANGLE_STEP = 0.3, 0.15
@@ -96,7 +96,7 @@ def cover_path(
     floor = shrunk(problem.workspace, 0.0)
     boxes, grid = box_arrays(swept, pairs), grid_inside(floor, problem.tree.reach)
     angle = float(path[-1, 2] + nearest_turn(float(problem.goal_pose[2] - path[-1, 2])))
-    goals = np.array(final_intervals(problem, angle))
+    goals = np.array(final_intervals(problem, goal_values(problem, angle, path[-1, 2:])))
     limits = np.full(len(problem.start) - 1, np.inf) if limits is None else limits
     # At a small margin some levels are equal; each is tried once.
     for least_clearance, pads in dict.fromkeys(

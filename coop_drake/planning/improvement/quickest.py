@@ -84,7 +84,7 @@ def _quickest(
     progress: Progress | None,
 ) -> Plan:
     if isinstance(found, Channel):
-        found = turned_to_start(found, problem.start[2])
+        found = turned_to_start(problem, found)
         check_ends(problem, found)
     path = found.path if found.path is not None else path_through(problem, found)
     if progress is not None:

@@ -11,7 +11,7 @@ from shapely import Point, Polygon
 
 from coop_drake.answers.problem import PlanningProblem
 from coop_drake.answers.proof import InfeasibilityProof, OverCell, OverSlice, Witness
-from coop_drake.geometry.swept_tree import Intervals
+from coop_drake.geometry.swept_tree import Interval, Intervals
 from coop_drake.planning.cells.slices import halves
 from coop_drake.planning.proofs.witnesses import Witnesses
 
@@ -65,18 +65,21 @@ class _Writer:
         self._walls = [pair for ring in rings for pair in zip(ring.coords[:-1], ring.coords[1:], strict=True)]
 
     def ranges(self, near: float) -> tuple[Intervals, Intervals]:
-        """A turn and the joints' limits, and what is near the goal, up to an axis with nothing near it."""
-        angle = float(self._problem.goal_pose[2])
-        whole = [(angle - near, float(np.nextafter(angle - near + 2.0 * pi, angle)))]
-        goal = [(angle - near, angle + near)]
-        joints = self._problem.tree.joints
-        whole += [(joint.lower, joint.upper) for joint in joints]
-        for joint, aim in zip(joints, self._problem.goal_joints, strict=True):
+        """The ranges of all axes, and what is near the goal, up to an axis with nothing near it.
+
+        Where a circular axis has a goal, its range is the turn that begins with what is near the goal.
+        """
+        joints, whole, goal = self._problem.tree.joints, list[Interval](), list[Interval]()
+        aims = (float(self._problem.goal_pose[2]), *self._problem.goal_joints)
+        ranges = ((-pi, pi), *(joint.range for joint in joints))
+        for (lower, upper), aim, circular in zip(ranges, aims, self._problem.tree.circular, strict=True):
+            if circular and aim is not None:
+                lower = aim - near
+                upper = float(np.nextafter(lower + 2.0 * pi, aim))
+            whole.append((lower, upper))
             low, high = (-np.inf, np.inf) if aim is None else (aim - near, aim + near)
-            ends = max(joint.lower, low), min(joint.upper, high)
-            if ends[0] > ends[1]:
-                break
-            goal.append(ends)
+            if len(goal) + 1 == len(whole) and max(lower, low) <= min(upper, high):
+                goal.append((max(lower, low), min(upper, high)))
         return tuple(whole), tuple(goal)
 
     def near_goal(self, box: Intervals, goal: Intervals) -> OverSlice | None:

@@ -90,7 +90,7 @@ def _blocked(question: PlanningProblem, maker: CellMaker) -> tuple[list[Interval
     """
     angle = float(question.goal_pose[2])
     joints = [
-        (joint.lower, joint.upper) if goal is None else (goal, goal)
+        joint.range if goal is None else (goal, goal)
         for joint, goal in zip(question.tree.joints, question.goal_joints, strict=True)
     ]
     left: list[Intervals] = [((angle, angle), *joints)]

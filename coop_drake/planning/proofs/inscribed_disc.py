@@ -69,7 +69,7 @@ def _places(problem: PlanningProblem, component: int, centre: FloatArray) -> Bas
     bounds = np.array(
         [(angle, angle)]
         + [
-            (joint.lower, joint.upper) if goal is None else (goal, goal)
+            joint.range if goal is None else (goal, goal)
             for joint, goal in zip(tree.joints, problem.goal_joints, strict=True)
         ]
     )

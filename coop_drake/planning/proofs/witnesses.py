@@ -44,7 +44,7 @@ class Witnesses:
         self._owners = [k for k, c in enumerate(tree.components) for body in c.bodies for _ in body.shapes]
 
     def ends(self, intervals: Intervals) -> tuple[FloatArray, FloatArray]:
-        """Ends of a slice of the whole team, shape (1 + n,): other joints move within their limits."""
+        """Ends of a slice of the whole team, shape (1 + n,): other joints move within their ranges."""
         kept = {joint.name: ends for joint, ends in zip(self._swept.tree.joints, intervals[1:], strict=True)}
         return slice_ends(self._tree, intervals[0], kept)
 
@@ -120,8 +120,8 @@ class Witnesses:
 def slice_ends(
     tree: ComponentTree, angles: Interval, kept: Mapping[str, Interval]
 ) -> tuple[FloatArray, FloatArray]:
-    """Ends, shape (1 + n,), of angles, of intervals of joints by name, and of the limits of all others."""
-    joints = [kept.get(joint.name, (joint.lower, joint.upper)) for joint in tree.joints]
+    """Ends, shape (1 + n,), of angles, of intervals of joints by name, and of the ranges of all others."""
+    joints = [kept.get(joint.name, joint.range) for joint in tree.joints]
     lower, upper = np.array([angles, *joints], dtype=float).T
     return lower.copy(), upper.copy()
 

@@ -28,10 +28,11 @@ def check_question(problem: PlanningProblem) -> None:
     if not np.isfinite(shapely.get_coordinates(problem.workspace)).all():
         raise PlanError("workspace: has corners that are not allowed; expected finite numbers")
     for joint in joints:
-        if not -np.inf < joint.lower <= joint.upper < np.inf:
+        endless = joint.circular and joint.kind == "revolute"
+        if not (endless or -np.inf < joint.lower <= joint.upper < np.inf):
             raise PlanError(
                 f"limits of {joint.name}: [{joint.lower}, {joint.upper}] are not allowed; expected two "
-                f"finite limits, the lower one first; a revolute joint without limits has [-pi, pi]"
+                f"finite limits, the lower one first, or none for a revolute joint, which is a circle then"
             )
         start, goal = float(problem.start[3 + joint.index]), problem.goal_joints[joint.index]
         if not _within(start, joint):

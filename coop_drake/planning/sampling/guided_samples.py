@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from coop_drake.compiled import compiled
 from coop_drake.planning.sampling.collision_kernels import component_is_free
@@ -59,6 +60,7 @@ class SampledRegion(NamedTuple):
         spread: How far around, for each axis; 0 for axes that the guide does not know, shape (d,) [m, rad].
         lower: Lower ends of the box that is sampled uniformly, shape (d,) [m, rad].
         upper: Upper ends, shape (d,).
+        circular: Which axes are circles: guided samples may lie beyond these ends there, shape (d,).
         long: A guide with more rows than this [-] is followed: most samples are drawn where a tree has come
             furthest, because those far from both trees are of little use.
         tries: Values that are tried for the axes of a component until it is free [-]; with one try samples
@@ -69,6 +71,7 @@ class SampledRegion(NamedTuple):
     spread: FloatArray
     lower: FloatArray
     upper: FloatArray
+    circular: NDArray[np.bool_]
     long: int
     tries: int
 
@@ -111,7 +114,7 @@ def _value(region: SampledRegion, u: FloatArray, at: int, k: int, number: float)
         return float(lower + number * (upper - lower))
     fraction = _LEAST_SPREAD + (1.0 - _LEAST_SPREAD) * u[0] / _GUIDED
     value = region.guide[at, k] + (2.0 * number - 1.0) * fraction * spread
-    return float(min(upper, max(lower, value)) if k > 2 else value)
+    return float(value if k < 2 or region.circular[k] else min(upper, max(lower, value)))
 
 
 @compiled

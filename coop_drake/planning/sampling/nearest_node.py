@@ -6,6 +6,7 @@ from math import floor, pi, sqrt
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from coop_drake.compiled import compiled
 from coop_drake.tree.pose import FloatArray, IntArray
@@ -27,6 +28,7 @@ class Tree(NamedTuple):
         before: For each node the one before it in its place, -1 if there is none, shape (N,).
         frame: Lower corner of the grid and the side of a square, shape (3,) [m].
         rows: Number of squares along y; squares are numbered along y first.
+        circular: Which axes of configurations are circles, shape (d,).
     """
 
     nodes: FloatArray
@@ -36,10 +38,11 @@ class Tree(NamedTuple):
     before: IntArray
     frame: FloatArray
     rows: int
+    circular: NDArray[np.bool_]
 
 
 @compiled
-def empty_tree(capacity: int, lower: FloatArray, upper: FloatArray) -> Tree:
+def empty_tree(capacity: int, lower: FloatArray, upper: FloatArray, circular: NDArray[np.bool_]) -> Tree:
     """A tree without nodes, with memory for ``capacity`` of them, on a floor between two corners."""
     width, height = upper[0] - lower[0], upper[1] - lower[1]
     side = max(sqrt(width * height / _SQUARES), 1e-9)
@@ -47,7 +50,7 @@ def empty_tree(capacity: int, lower: FloatArray, upper: FloatArray) -> Tree:
     return Tree(
         np.empty((capacity, len(lower))), np.full(capacity, -1), np.zeros(rows * columns, np.int64),
         np.empty((rows * columns, _TURNS), np.int64), np.full(capacity, -1),
-        np.array([lower[0], lower[1], side]), rows,
+        np.array([lower[0], lower[1], side]), rows, circular,
     )  # fmt: skip
 
 
@@ -93,7 +96,7 @@ def _nearest_in(
         total = 0.0
         for k in range(len(z)):
             d = z[k] - tree.nodes[node, k]
-            if k == 2:
+            if tree.circular[k]:
                 d -= 2.0 * pi * floor(d / (2.0 * pi) + 0.5)
             total += (d * scale[k]) ** 2
             if total >= best:
@@ -106,7 +109,7 @@ def _nearest_in(
 
 @compiled
 def nearest(tree: Tree, z: FloatArray, scale: FloatArray) -> int:
-    """Index of the node nearest to z; theta (axis 2) is periodic.
+    """Index of the node nearest to z; circular axes are periodic, theta (axis 2) among them.
 
     Squares are searched in growing rings, and in each of them the parts of a turn on both sides of theta.
     """

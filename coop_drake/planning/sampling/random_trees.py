@@ -33,7 +33,7 @@ def _grow(
     move, aim = np.empty(len(z)), np.empty(len(z))
     for k in range(len(z)):
         move[k] = z[k] - tree.nodes[near, k]
-        if k == 2:
+        if tree.circular[k]:
             move[k] -= 2.0 * pi * floor(move[k] / (2.0 * pi) + 0.5)
         length += (move[k] * scale[k]) ** 2
     length = sqrt(length)
@@ -75,12 +75,13 @@ def connect(
         uniforms: Random numbers in [0, 1), one row for each sample, shape (S, 2 + d).
 
     Returns:
-        Path from start to a goal, theta unwrapped, shape (m, d), without rows if none was found; and the
-        number of samples drawn.
+        Path from start to a goal, circular axes unwrapped, shape (m, d), without rows if none was found; and
+        the number of samples drawn.
     """
     capacity = 2 * len(uniforms) + len(roots) + 1
     lower, upper = region.lower, region.upper
-    trees = (empty_tree(capacity, lower, upper), empty_tree(capacity, lower, upper))
+    circular = region.circular
+    trees = (empty_tree(capacity, lower, upper, circular), empty_tree(capacity, lower, upper, circular))
     counts = np.array([1, len(roots)])
     for side in range(2):
         for k in range(counts[side]):
@@ -172,7 +173,9 @@ def _join(first: Tree, last: Tree, counts: IntArray) -> FloatArray:
     while i >= 0:
         for k in range(path.shape[1]):
             path[size, k] = last.nodes[i, k]
-        turn = last.nodes[i, 2] - path[size - 1, 2]
-        path[size, 2] = path[size - 1, 2] + turn - 2.0 * pi * floor(turn / (2.0 * pi) + 0.5)
+        for k in range(path.shape[1]):
+            if first.circular[k]:
+                turn = last.nodes[i, k] - path[size - 1, k]
+                path[size, k] = path[size - 1, k] + turn - 2.0 * pi * floor(turn / (2.0 * pi) + 0.5)
         size, i = size + 1, last.parents[i]
     return path[:size]

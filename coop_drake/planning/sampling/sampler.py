@@ -228,15 +228,16 @@ class Sampler:
         way: tuple[int, int],
     ) -> tuple[FloatArray, int]:
         tree = subsystem.question.tree
-        lower = np.array([*self._bounds[:2], -np.pi, *tree.joint_lower])
-        upper = np.array([*self._bounds[2:], np.pi, *tree.joint_upper])
+        lower = np.array([*self._bounds[:2], -np.pi, *tree.range_lower])
+        upper = np.array([*self._bounds[2:], np.pi, *tree.range_upper])
+        circular = np.array([False, False, *tree.circular])
         uniforms = self._random.random((samples, 2 + len(lower)))
         path, drawn = connect(
             subsystem.team,
             self._grid,
             subsystem.start,
             roots,
-            SampledRegion(guide, spread, lower, upper, *way),
+            SampledRegion(guide, spread, lower, upper, circular, *way),
             subsystem.scale,
             self._gap,
             COLLISION_STEP,
@@ -247,7 +248,7 @@ class Sampler:
     def _goals(self, subsystem: Subsystem) -> FloatArray:
         """Free goal configurations: joints with a goal have that value, the others random values."""
         question = subsystem.question
-        lower, upper = question.tree.joint_lower, question.tree.joint_upper
+        lower, upper = question.tree.range_lower, question.tree.range_upper
         roots: list[FloatArray] = []
         free = [i for i, value in enumerate(question.goal_joints) if value is None]
         fixed = [0.0 if value is None else value for value in question.goal_joints]

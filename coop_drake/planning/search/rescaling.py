@@ -103,7 +103,12 @@ class Rescaling:
             made,
             start=self.problem.start.copy(),
             goal_pose=np.array([*self.problem.goal_pose[:2], made.goal_pose[2]]),
-            goal_joints=self.problem.goal_joints,
+            goal_joints=tuple(
+                turned if joint.circular else own
+                for joint, turned, own in zip(
+                    self.problem.tree.joints, made.goal_joints, self.problem.goal_joints, strict=True
+                )
+            ),
             cells=cells,
             transitions=transitions,
         )
@@ -171,7 +176,7 @@ class Rescaling:
         """Ends of a slice in metres; those that are limits are the limits, without rounding."""
         found = ends * self._units[2:]
         tree, usual = self.problem.tree, self.question().tree
-        for exact, limits in ((tree.joint_lower, usual.joint_lower), (tree.joint_upper, usual.joint_upper)):
+        for exact, limits in ((tree.range_lower, usual.range_lower), (tree.range_upper, usual.range_upper)):
             found[1:] = np.where(ends[1:] == limits, exact, found[1:])
         return found
 
