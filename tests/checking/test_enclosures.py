@@ -183,7 +183,7 @@ def test_repeated_corners_make_no_edges_and_a_point_makes_one():
 
 BAR = [[-2, -0.05], [2, -0.05], [2, 0.05], [-2, 0.05]]
 CORRIDOR = {
-    "format": "coop_drake question", "version": 2,
+    "format": "coop_drake question", "version": 3,
     "floor": {"outer": [[-10, 0], [10, 0], [10, 1.0], [-10, 1.0]], "holes": []},
     "lower": [-0.1, -0.1], "upper": [0.1, 0.1],
     "components": [
@@ -252,7 +252,7 @@ def test_edges_on_one_line_that_cross_a_cell_are_not_taken_to_lie_inside_it():
     cells = [around, *({"outer": ring, "holes": []} for ring in rings)]
     disc = {"body": "disc", "component": 0, "corners": [[0.0, 0.0]], "radius": 0.3}
     hall = {
-        "format": "coop_drake question", "version": 2,
+        "format": "coop_drake question", "version": 3,
         "floor": {"outer": rectangle(0, 0, 10, 10), "holes": []},
         "lower": [], "upper": [], "components": [], "pieces": [disc], "left_aside": [],
         "start": [5.0, 2.0, 0.0], "goal": [5.0, 8.0], "goal_lower": [0.0], "goal_upper": [0.0],
