@@ -51,7 +51,7 @@ def forged_proof(question: Document, seed: int) -> Document | None:
     piece, centre, polygon = sweep
     witness = {"pieces": [piece], "component": 0, "polygon": polygon}
     slice_ends = {"lower": [-pi, *question["lower"]], "upper": [pi, *question["upper"]]}
-    head = {"format": "coop_drake proof of infeasibility", "version": 3, "problem": ""}
+    head = {"format": "coop_drake proof of infeasibility", "version": 4, "problem": ""}
     return head | {
         "kind": "disc",
         "component": 0,

@@ -35,7 +35,11 @@ def problem_digest(problem: PlanningProblem) -> str:
             "goal_pose": _rounded(problem.goal_pose.tolist()),
             "goal_joints": _rounded(list(problem.goal_joints)),
             "tolerances": _rounded(
-                [problem.position_tolerance, problem.angle_tolerance, problem.joint_tolerance]
+                [
+                    problem.position_tolerance,
+                    problem.angle_tolerance,
+                    *np.atleast_1d(problem.joint_tolerance).tolist(),
+                ]
             ),
             **_limits(problem.limits),
         }

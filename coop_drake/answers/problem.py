@@ -65,6 +65,8 @@ class PlanningProblem:
     planned up to so much beyond that limit, everywhere on the way: plans and proofs are about these wider
     limits. A question whose start or goal is itself beyond a limit keeps the limits as they are.
 
+    The goal is a closed set: positions in the disc of the position's tolerance, and ``goal_box``.
+
     Attributes:
         workspace: The floor W, outer ring and holes [m].
         tree: The team as seen from the object outwards, with that room.
@@ -73,9 +75,10 @@ class PlanningProblem:
         goal_joints: Goal value of each joint, None where the joint is free, length n.
         position_tolerance: Final position tolerance [m].
         angle_tolerance: Final angle tolerance [rad].
-        joint_tolerance: Final tolerance of joints that have a goal [rad or m].
+        joint_tolerance: Final tolerance of joints that have a goal, of all or of each, shape (n,) [rad or m].
         settings: How hard to try.
         limits: Largest speeds of bases and joints.
+        roomy: Whether joints at their limits are given room; False for variants of a question.
     """
 
     workspace: Polygon
@@ -85,15 +88,16 @@ class PlanningProblem:
     goal_joints: tuple[float | None, ...]
     position_tolerance: float = 0.01
     angle_tolerance: float = 0.02
-    joint_tolerance: float = 0.02
+    joint_tolerance: float | FloatArray = 0.02
     settings: PlannerSettings = field(default_factory=PlannerSettings)
     limits: TeamLimits = field(default_factory=TeamLimits)
+    roomy: bool = True
 
     def __post_init__(self) -> None:
         """Give room to joints at their limits."""
         joints = [component.joint for component in self.tree.components if component.joint is not None]
         known = min(len(self.start) - 3, len(self.goal_joints))
-        if all(joint.index < known for joint in joints):
+        if self.roomy and all(joint.index < known for joint in joints):
             roomy = tuple(map(self._with_room, self.tree.components))
             if any(new is not old for new, old in zip(roomy, self.tree.components, strict=True)):
                 object.__setattr__(self, "tree", replace(self.tree, components=roomy))
@@ -113,6 +117,22 @@ class PlanningProblem:
         if (lower, upper) == (joint.lower, joint.upper):
             return component
         return replace(component, joint=replace(joint, lower=lower, upper=upper))
+
+
+def goal_box(problem: PlanningProblem) -> tuple[tuple[float, float], ...]:
+    """The goal's intervals of (theta, q...) [rad or m].
+
+    They are as wide as the tolerances say, those of joints clipped to their limits; joints without a goal
+    have their whole range. Values of circular axes are modulo a turn. The interval of a joint whose goal is
+    further beyond a limit is empty: its lower end is above its upper end.
+    """
+    joints, angle = problem.tree.joints, float(problem.goal_pose[2])
+    rooms = np.broadcast_to(problem.joint_tolerance, len(joints)).tolist()
+    ends = [
+        joint.range if goal is None else (max(goal - room, joint.lower), min(goal + room, joint.upper))
+        for joint, goal, room in zip(joints, problem.goal_joints, rooms, strict=True)
+    ]
+    return ((angle - problem.angle_tolerance, angle + problem.angle_tolerance), *ends)
 
 
 def at_goal(

@@ -101,7 +101,7 @@ class InfeasibilityProof:
 
     The slices cover a whole turn of the component's angle, in any unwrapping, and the limits of all joints
     without gap or overlap. Cells that touch, in one slice or in two that share a facet, are both reached or
-    both not; the start lies in reached ones only and the goal in none of them.
+    both not; the start lies in reached ones only, and nothing of the goal, within its tolerances, in them.
 
     Attributes:
         kind: How it was found: ``slices`` of the team or of a part of it, a ``disc`` inside one piece, or a

@@ -15,7 +15,7 @@ from coop_drake.typed_data import to_plain
 FORMAT = "coop_drake proof of infeasibility"
 """What the document says it is."""
 
-VERSION = 3
+VERSION = 4
 """Version of its layout; another one is refused."""
 
 

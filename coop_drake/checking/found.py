@@ -1,4 +1,4 @@
-"""A plan holds: cells are free, each leads to the next, the first holds the start, the last the goal."""
+"""A plan holds: cells are free, each leads to the next, from one with the start into the goal."""
 
 from itertools import pairwise
 from math import isqrt
@@ -22,8 +22,7 @@ def check_plan(question: Question, answer: Any, progress: plane.Progress) -> lis
     demand(holds(boxes[0], question.start_box), "cells[0]", "does not hold the start's angles")
     (room,) = numbers([transitions[-1]["inradius"]], 1)
     near = numbers(transitions[-1]["goal_lower"], question.axes)
-    ends = zip(question.goal_box, question.rooms, strict=True)
-    boxes.append([(low - tolerance, high + tolerance) for (low, high), tolerance in ends])
+    boxes.append(list(question.goal_box))
     for axis in question.circles:
         boxes[-1][axis] = unwrapped(boxes[-1][axis], (near[axis], near[axis]), outwards=-1)
     for k, value in enumerate(transitions):
@@ -31,13 +30,14 @@ def check_plan(question: Question, answer: Any, progress: plane.Progress) -> lis
         entry = _leads_on(value, f"transitions[{k}]", entry, boxes[k : k + 2], regions[k : k + 2])
         _check_free(question, boxes[k], regions[k], f"cells[{k}]")
         progress("checking cells", (k + 1) / count)
-    reached = entry == question.goal and room <= question.room
-    demand(reached, "transitions[-1]", "does not end at the goal's position within the tolerance")
+    (x, y), (p, q), left = entry, question.goal, question.room - room
+    reached = left >= 0 and (x - p) ** 2 + (y - q) ** 2 <= left**2
+    demand(reached, "transitions[-1]", "does not end within the tolerance of the goal's position")
     return [
         ("joint intervals lie within the joints' limits", count * (question.axes - 1)),
         ("each transition ends inside its cell and the next, in intervals of both", 2 * count - 1),
         ("a path to each target has the stated length and distance from the cell's boundary", count),
-        ("the start lies in the first cell, the goal at the end of the last transition", 2),
+        ("the start lies in the first cell, the end of the last transition in the goal", 2),
         ("no piece meets a wall at any configuration of any cell", count * len(question.pieces)),
         ("no two pieces of a pair meet at any configuration of any cell", count * len(question.pairs)),
     ]

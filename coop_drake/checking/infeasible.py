@@ -43,14 +43,15 @@ def check_proof(question: Question, answer: Any, progress: plane.Progress) -> li
         for (i, (one, cell)), (j, (other, another)) in product(enumerate(cells[a]), enumerate(cells[b])):
             finding = f"touches slices[{b}].cells[{j}], which has another label"
             demand(one == other or not cell.touches(another), f"slices[{a}].cells[{i}]", finding)
-    starts, goals = (question.start, question.start_box, False), (question.goal, question.goal_box, True)
+    starts = (question.start, 0, question.start_box, False)
+    goals = (question.goal, question.room, question.goal_box, True)
     for k, value in enumerate(slices):
         where, wide = f"slices[{k}]", [(low - WIDENING, high + WIDENING) for low, high in boxes[k]]
         demand(all(type(label) is bool for label, _ in cells[k]), where, "has labels that are no booleans")
-        for place, box, label in (starts, goals):
+        for place, room, box, label in (starts, goals):
             wrong = [cell for its, cell in cells[k] if its == label and _meets(wide, box, chain, question)]
             steps, name = [*chain, Step(offset=place)], "goal" if label else "start"
-            clear = free([point], 0, steps, box, wrong, lambda cell, *at: cell.side(*at) < 0)
+            clear = free([point], room, steps, box, wrong, lambda cell, *at: cell.side(*at) < 0)
             demand(clear, where, f"cells may hold the {name} and have reached: {label}")
         frame = [Step(0, -1, offset=point), *chain]
         forbidden = _forbidden(question, frame, wide, value["witnesses"], where)
@@ -65,7 +66,7 @@ def check_proof(question: Question, answer: Any, progress: plane.Progress) -> li
         ("pieces are squeezed in all of a slice", sum(len(value.get("squeezes", [])) for value in slices)),
         ("edges of cells and of forbidden positions lie inside others: they are all positions", edges),
         ("cells that touch, in a slice or across a facet, have one label", len(neighbours)),
-        ("the start lies in reached cells alone, the goal in none of them", 2),
+        ("the start lies in reached cells alone, nothing of the goal in any of them", 2),
     ]
 
 

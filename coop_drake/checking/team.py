@@ -116,7 +116,10 @@ def intervals(lower: Any, upper: Any, axes: int, least: int = 0) -> list[Interva
 class Question:
     """What is asked; the page on certificates in the documentation says what the document's entries mean.
 
-    ``circles`` are the axes of (theta, q...) on which values that differ by whole turns are one.
+    ``circles`` are the axes of (theta, q...) on which values that differ by whole turns are one. The goal is
+    a closed set: positions in the disc of the radius ``room`` about ``goal``, and values of all axes in
+    ``goal_box``. The interval of a joint whose goal is beyond its limits is empty: its lower end is above its
+    upper end.
     """
 
     def __init__(self, value: Any) -> None:
@@ -153,7 +156,12 @@ class Question:
         aims = list(zip(value["goal_lower"], value["goal_upper"], strict=True))
         free = {axis for axis in self.circles if aims[axis] == (None, None)}
         known = [(0, 0) if axis in free else aim for axis, aim in enumerate(aims)]
-        self.goal_box = intervals([low for low, _ in known], [high for _, high in known], self.axes)
+        ends = intervals([low for low, _ in known], [high for _, high in known], self.axes)
+        self.room, *rooms = numbers(value["tolerances"], 1 + self.axes)
+        demand(min(self.room, *rooms) >= 0, "question.tolerances", "are negative")
+        self.goal_box = [(low - room, high + room) for (low, high), room in zip(ends, rooms, strict=True)]
+        for axis, (low, high) in enumerate(self.limits, 1):
+            if axis not in self.circles:
+                self.goal_box[axis] = max(self.goal_box[axis][0], low), min(self.goal_box[axis][1], high)
         for axis in free:  # A whole turn, rounded outwards.
             self.goal_box[axis] = -(TURN // 2) - 1, TURN // 2 + 1
-        self.room, *self.rooms = numbers(value["tolerances"], 1 + self.axes)

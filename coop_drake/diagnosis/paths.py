@@ -12,6 +12,7 @@ from coop_drake.geometry.passage import pole
 from coop_drake.geometry.swept_tree import SweptTree
 from coop_drake.planning import Channel
 from coop_drake.planning.boxes.certify import Certifier
+from coop_drake.planning.boxes.channel import ended
 from coop_drake.planning.execution.channel_path import path_through
 from coop_drake.planning.questions.margins import exact_footprint, marginal_workspace
 from coop_drake.tree.levers import configuration_scale
@@ -48,4 +49,5 @@ def widest_path(problem: PlanningProblem, channel: Channel) -> FloatArray:
     for one, other in pairwise(channel.boxes):
         poles = map(pole, parts_of(one.polygon.intersection(other.polygon)))
         targets.append(max(poles, key=lambda found: found[1])[0])
+    problem = ended(problem, channel)
     return path_through(problem, channel, [*targets, problem.goal_pose[:2]])

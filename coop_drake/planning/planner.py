@@ -10,6 +10,7 @@ from math import inf
 from time import thread_time
 from typing import TYPE_CHECKING
 
+import numpy as np
 from shapely.errors import ShapelyError
 
 from coop_drake.answers.budget import Budget
@@ -19,7 +20,8 @@ from coop_drake.answers.problem import PlanningProblem
 from coop_drake.answers.search_report import SearchReport
 from coop_drake.errors import GeometryError, PatienceError, PlanError, StallError, TooQuickError
 from coop_drake.laws import GainSet, ScheduledGains
-from coop_drake.planning.boxes.channel import Channel, CoveredPath, NoChannel
+from coop_drake.planning.boxes.channel import Channel, CoveredPath, NoChannel, ended
+from coop_drake.planning.cells.ends import SAME_END
 from coop_drake.planning.execution.estimate import plan_time
 from coop_drake.planning.execution.refusals import refusals, without_limits
 from coop_drake.planning.improvement.further_paths import quicker_plans
@@ -27,6 +29,7 @@ from coop_drake.planning.improvement.quickest import quickest_plan
 from coop_drake.planning.sampling.local_floor import local_question
 from coop_drake.planning.search.search import find_path
 from coop_drake.progress import Progress
+from coop_drake.tree.circles import nearest_turn
 
 if TYPE_CHECKING:
     from coop_drake.planning.budget.tolerant import BeyondBudget
@@ -116,8 +119,8 @@ def _answer(
                 return Infeasible(answer.reason, report, answer.proof)
             stall = stall or answer.reason
             break
-        way = answer
-        make = partial(_made, question, gain_set, gain_set_name, budget)
+        way, asked = answer, ended(question, answer)
+        make = partial(_made, asked, gain_set, gain_set_name, budget)
         try:
             made = _finished(partial(make, answer), progress)
         except (GeometryError, PlanError, StallError, ShapelyError) as error:
@@ -128,7 +131,8 @@ def _answer(
             question = replace(question, settings=replace(question.settings, margin=0.5 * answer.margin))
         else:
             latest = replace(report, improvements=())
-            return _found(question, answer, made, make, latest, began, progress, workers)
+            found = _found(asked, answer, made, make, latest, began, progress, workers)
+            return replace(found, plan=_stated(problem, found.plan)) if isinstance(found, Found) else found
     refused = way and _without_limits(problem, way, gain_set, gain_set_name, slowly=too_quick)
     return BeyondLimits(refused, report) if refused else Undecided(stall, report)
 
@@ -162,13 +166,35 @@ def _without_limits(
     factor = 1.0
     if slowly and isinstance(gain_set, ScheduledGains):
         factor, gain_set = AGE_FACTORS[-1], gain_set.slowed(AGE_FACTORS[-1])
+    asked = ended(problem, found)
     try:
-        made = quickest_plan(without_limits(problem), found, gain_set, gain_set_name=name)
+        made = quickest_plan(without_limits(asked), found, gain_set, gain_set_name=name)
     except (GeometryError, PlanError, StallError, ShapelyError):
         return None
-    broken = refusals(problem, made)
-    digest = problem_digest(problem)
-    return replace(made, problem=digest, age_factor=factor, refused_by=broken) if broken else None
+    broken = refusals(asked, made)
+    return _stated(problem, replace(made, age_factor=factor, refused_by=broken)) if broken else None
+
+
+def _stated(problem: PlanningProblem, made: Plan) -> Plan:
+    """A plan as an answer to a question, in whose goal it ends, though not always in its middle."""
+    values = zip(
+        (float(made.goal_pose[2]), *made.goal_joints),
+        (float(problem.goal_pose[2]), *problem.goal_joints),
+        problem.tree.circular,
+        strict=True,
+    )
+    angle, *joints = [
+        _turned(goal, own) if circular and own is not None and goal is not None else goal
+        for own, goal, circular in values
+    ]
+    pose = np.array([*problem.goal_pose[:2], angle])
+    return replace(made, problem=problem_digest(problem), goal_pose=pose, goal_joints=tuple(joints))
+
+
+def _turned(goal: float, near: float) -> float:
+    """A goal on a circle after whole turns, nearest to where a plan ends, that itself if rounded [rad]."""
+    away = nearest_turn(goal - near)
+    return near if abs(away) <= SAME_END else near + away
 
 
 def _finished(

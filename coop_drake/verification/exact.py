@@ -99,7 +99,7 @@ def verify_proof(
     """Check a proof that no plan exists.
 
     What cannot move from start to goal with some of the robots left out cannot do so with all of them: a
-    proof may keep any of them. It is about the goal pose itself, not about the tolerances around it.
+    proof may keep any of them. It is about all of the goal: its pose and joints with their tolerances.
 
     Args:
         proof: The proof.
@@ -119,8 +119,8 @@ def verify_proof(
         "infeasible",
         subject,
         checks,
-        "no motion leads from the start to the goal pose",
-        "that none leads to one within its tolerances; that the robots are as in their models",
+        "no motion leads from the start to the goal, nor to anywhere within its tolerances",
+        "that the robots are as in their models",
     )
 
 

@@ -104,6 +104,44 @@ def test_a_pillar_as_thin_as_a_hair_blocks_and_a_gap_of_the_disc_does_not():
     assert "no cell covers" in refused(low, PROOF)
 
 
+@pytest.mark.parametrize(
+    ("goal", "room", "held"),
+    [
+        ([3.81, 1], 0.01, True),
+        ([3.81, 1], 0.01 + 1e-15, False),
+        ([3.9, 1.9], 0.14, True),
+        ([3.9, 1.9], 0.15, False),
+    ],
+)
+def test_a_no_covers_all_positions_of_the_goal(goal, room, held):
+    """The reached cell ends at x = 3.8 and y = 1.8, of which the doubles are a little less."""
+    question = QUESTION | {"goal": goal, "tolerances": [room, 0.02]}
+    if held:
+        assert check(question, PROOF)
+    else:
+        assert "cells may hold the goal and have reached: True" in refused(question, PROOF)
+
+
+@pytest.mark.parametrize(
+    ("angle", "room", "held"),
+    [(pi - 0.3, 0.05, True), (pi - 0.3, 0.2, False), (3 * pi - 0.3, 0.2, False), (-3 * pi - 0.3, 0.2, False)],
+)
+def test_a_no_covers_all_angles_of_the_goal_modulo_a_turn(angle, room, held):
+    """The middle of the disc is half a metre from the origin of the object."""
+    question = QUESTION | {"start": [0.5, 1, 0], "goal": [4.29, 1], "tolerances": [0.001, room]}
+    question |= {"goal_lower": [angle], "goal_upper": [angle]}
+    question = altered(question, [[0.5, 0]], "pieces", 0, "corners")
+    proof = PROOF | {"point": [0.5, 0]}
+    if held:
+        assert check(question, proof)
+    else:
+        assert "cells may hold the goal and have reached: True" in refused(question, proof)
+
+
+def test_tolerances_are_not_negative():
+    assert "question.tolerances: are negative" in refused(QUESTION | {"tolerances": [-0.01, 0.02]}, PROOF)
+
+
 TEAM = {
     **QUESTION,
     "floor": rectangle(0, 0, 8, 8),
@@ -123,7 +161,7 @@ TEAM = {
 def plan(lower=0.2, upper=0.6):
     path = [[2, 4], [3, 4]]
     return {
-        "format": "coop_drake plan", "version": 3,
+        "format": "coop_drake plan", "version": 4,
         "cells": [{"lower": [-0.1, lower], "upper": [0.1, upper], "tidied": rectangle(1.5, 3.5, 4, 4.5)}],
         "transitions": [{
             "target": [3, 4], "goal_lower": [-0.01, 0.49], "goal_upper": [0.01, 0.51], "path": path,
@@ -156,6 +194,30 @@ def test_a_plan_with_a_prismatic_joint_holds_and_its_goal_is_met_modulo_a_turn()
 )
 def test_figures_of_a_plan_that_are_not_true_are_refused(value, way, finding):
     assert finding in refused(TEAM, altered(plan(), value, "transitions", 0, *way))
+
+
+@pytest.mark.parametrize(("target", "inradius", "held"), [(3.004, 0.005, True), (3.006, 0.005, False)])
+def test_a_plan_ends_within_the_goal_and_not_always_in_its_middle(target, inradius, held):
+    answer = plan()
+    answer["transitions"][0] |= {
+        "target": [target, 4], "path": [[2, 4], [target, 4]], "length": target - 2, "inradius": inradius,
+    }  # fmt: skip
+    if held:
+        assert check(TEAM, answer)
+    else:
+        assert "does not end within the tolerance" in refused(TEAM, answer)
+
+
+def test_joints_of_the_goal_are_within_their_limits():
+    """Of 0.99 to 1.01 the limits leave 0.99 to 1, of 1.01 to 1.03 nothing."""
+    question = TEAM | {"goal_lower": [0, 1.0], "goal_upper": [0, 1.0], "tolerances": [0.01, 0.02, 0.01]}
+    answer = plan(upper=1.0)
+    answer["transitions"][0] |= {"goal_lower": [-0.01, 0.991], "goal_upper": [0.01, 1.0]}
+    assert check(question, answer)
+    answer = altered(answer, [0.01, 1.0 + 1e-8], "transitions", 0, "goal_upper")
+    assert "leaves a cell" in refused(question, answer)
+    beyond = question | {"goal_lower": [0, 1.02], "goal_upper": [0, 1.02]}
+    assert "leaves a cell or the tolerance" in refused(beyond, answer)
 
 
 def test_a_cell_that_reaches_to_a_wall_or_beyond_is_refused():

@@ -261,6 +261,6 @@ def test_edges_on_one_line_that_cross_a_cell_are_not_taken_to_lie_inside_it():
     witness = {"pieces": [0], "component": 0, "polygon": rectangle(-0.1, -0.1, 0.1, 0.1)}
     whole = {"lower": [-3.141592653589793], "upper": [3.141592653589793], "witnesses": [witness]}
     whole["cells"] = [{"reached": True, "polygon": cell} for cell in cells]
-    proof = {"format": "coop_drake proof of infeasibility", "version": 3, "component": 0, "point": [0, 0]}
+    proof = {"format": "coop_drake proof of infeasibility", "version": 4, "component": 0, "point": [0, 0]}
     with pytest.raises(RefusedError, match="no cell covers"):
         check(hall, {**proof, "slices": [whole]})

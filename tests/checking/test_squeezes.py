@@ -61,7 +61,7 @@ def along(low, high, *, reached):
 
 QUARTER = pi / 2
 PROOF = {
-    "format": "coop_drake proof of infeasibility", "version": 3, "component": 0, "point": [0, 0],
+    "format": "coop_drake proof of infeasibility", "version": 4, "component": 0, "point": [0, 0],
     "slices": [
         along(HALF - QUARTER, QUARTER - HALF, reached=True),
         across(QUARTER, 1),

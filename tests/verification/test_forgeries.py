@@ -28,7 +28,7 @@ BLOCKED_GOALS = {
     "base": (4.25, 7.29, 0.26),
     "tight": (4.25, 7.29, 0.26),
     "three": (1.79, 0.73, -2.89),
-    "elbow": (4.3, 3.11, -0.78),
+    "elbow": (4.3, 3.1, -0.78),
     "pillar": (5.48, 4.11, -1.93),
 }
 """Goals (x, y, theta) of each scenario that are blocked, but not in the same way at all angles of a joint."""

@@ -48,9 +48,12 @@ def test_floor_start_goal_and_limits_are_the_problems(tmp_path):
     asked = Question(json.loads(save_question(problem, tmp_path / "question.json").read_text()))
     assert sum(map(len, asked.floor.rings)) == 29
     start = [*asked.start, *[low for low, _ in asked.start_box]]
-    goal = [*asked.goal, asked.goal_box[0][0]]
+    goal = [*asked.goal, sum(asked.goal_box[0]) // 2]
     np.testing.assert_allclose(metres(start).astype(float), problem.start, rtol=0.0, atol=1e-15)
     np.testing.assert_allclose(metres(goal).astype(float), problem.goal_pose, rtol=0.0, atol=1e-15)
+    room = [asked.room, (asked.goal_box[0][1] - asked.goal_box[0][0]) // 2]
+    tolerances = [problem.position_tolerance, problem.angle_tolerance]
+    np.testing.assert_allclose(metres(room).astype(float), tolerances, rtol=0.0, atol=1e-15)
     limits = np.stack((problem.tree.joint_lower, problem.tree.joint_upper), axis=1)
     np.testing.assert_allclose(metres(asked.limits).astype(float), limits, rtol=0.0, atol=1e-15)
 

@@ -16,6 +16,7 @@ from coop_drake.geometry.swept_tree import Intervals, SweptTree
 from coop_drake.planning.boxes.certify import PathBox
 from coop_drake.planning.boxes.channel import Channel, FreeBox
 from coop_drake.planning.cells.cells import CellMaker, Region, regions_of
+from coop_drake.planning.cells.ends import end_in, ending_at
 from coop_drake.planning.questions.floor_near import nearby
 from coop_drake.planning.questions.margins import disc_polygon, is_patched, marginal_workspace
 from coop_drake.tree.circles import nearest_turn, turns_to
@@ -138,9 +139,11 @@ def make_channel(
         )
         for box, angles in zip(boxes, turned, strict=True)
     )
+    end = None if path is not None else end_in(problem, turned[-1], boxes[-1].core)
+    asked = problem if end is None else ending_at(problem, end)
     middle = 0.5 * (free[-1].lower[0] + free[-1].upper[0])
-    goal = float(middle + nearest_turn(float(problem.goal_pose[2]) - middle))
-    return Channel(free, margin, goal, path)
+    goal = float(middle + nearest_turn(float(asked.goal_pose[2]) - middle))
+    return Channel(free, margin, goal, path, end=end)
 
 
 def explored_channel(problem: PlanningProblem, boxes: Sequence[tuple[Intervals, Region]]) -> Channel:

@@ -10,9 +10,11 @@ import numpy as np
 from shapely import Polygon
 
 from coop_drake.answers.mixed_cell import MixedCell
+from coop_drake.answers.problem import PlanningProblem
 from coop_drake.answers.proof import InfeasibilityProof
 from coop_drake.geometry.parts import parts_of
 from coop_drake.geometry.passage import pole
+from coop_drake.planning.cells.ends import ending_at
 from coop_drake.tree.pose import FloatArray
 
 
@@ -40,10 +42,12 @@ class Channel:
     Attributes:
         boxes: From the box that holds the start to the box that holds the goal.
         margin: The margin rho that the cores keep [m].
-        goal_angle: The goal's theta, unwrapped along the boxes [rad].
+        goal_angle: Theta where it ends, unwrapped along the boxes [rad].
         path: The path that the boxes were laid along, theta unwrapped like theirs, shape (m, 3 + n) [m, rad];
             None if they were found without a path.
         ends: Where that path leaves each box, shape (boxes, 2) [m]; None without a path.
+        end: The configuration in which it ends without a path, theta modulo a turn, shape (3 + n,) [m, rad];
+            None for the middle of the goal.
     """
 
     boxes: tuple[FreeBox, ...]
@@ -51,6 +55,7 @@ class Channel:
     goal_angle: float
     path: FloatArray | None = None
     ends: FloatArray | None = None
+    end: FloatArray | None = None
 
 
 def middle_of(channel: Channel, start: FloatArray) -> FloatArray:
@@ -86,6 +91,14 @@ class CoveredPath:
     margin: float
     channel: Callable[[], Channel]
     another: Callable[[int, float], CoveredPath | None] = lambda number, share: None
+
+
+def ended(problem: PlanningProblem, found: Channel | CoveredPath) -> PlanningProblem:
+    """The question of ending where a channel or a path ends; the same one if it is the middle of the goal."""
+    end = found.end if isinstance(found, Channel) else None
+    if found.path is not None:
+        end = found.path[-1]
+    return problem if end is None else ending_at(problem, end)
 
 
 @dataclass(frozen=True)

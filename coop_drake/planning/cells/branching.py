@@ -6,12 +6,12 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from coop_drake.answers.problem import PlanningProblem
+from coop_drake.answers.problem import PlanningProblem, goal_box
 from coop_drake.geometry.safeguards import shared
 from coop_drake.geometry.swept_tree import Intervals
 from coop_drake.planning.cells.cell_graph import GraphCell
 from coop_drake.planning.cells.cells import CellMaker, Region
-from coop_drake.planning.cells.slices import Slices, halves, holds, share_facet
+from coop_drake.planning.cells.slices import Slices, halves, holds, meets, share_facet
 
 
 @dataclass(frozen=True)
@@ -48,9 +48,8 @@ class StrongBranching:
     def __init__(self, problem: PlanningProblem, slices: Slices, maker: CellMaker) -> None:
         self._slices, self._maker = slices, maker
         self._times_blocking: Counter[int] = Counter()
-        start, goal = problem.start, problem.goal_pose
-        self._start = [float(angle) for angle in start[2:]], start[:2]
-        self._goal = [float(goal[2]), *problem.goal_joints], goal[:2]
+        self._start = [float(angle) for angle in problem.start[2:]], problem.start[:2]
+        self._goal = goal_box(problem), problem.goal_pose[:2], problem.position_tolerance
 
     def trial(self, path: Sequence[GraphCell], place: int, axis: int) -> TrialSplit:
         """Halve the cell at a place of a path along an axis, on trial."""
@@ -102,8 +101,12 @@ class StrongBranching:
             intervals = self._slices.all[other.slice].intervals
             beside = share_facet(part.intervals, intervals, self._slices.circular)
             return beside and part.region.meets(other.region)
-        angles, position = self._start if place < 0 else self._goal
-        return holds(part.intervals, angles, self._slices.circular) and part.region.holds(position)
+        circular = self._slices.circular
+        if place < 0:
+            angles, position = self._start
+            return holds(part.intervals, angles, circular) and part.region.holds(position)
+        box, position, room = self._goal
+        return meets(part.intervals, box, circular) and part.region.near(position, room)
 
 
 def _joined(parts: Sequence[_Part], first: Sequence[bool], last: Sequence[bool]) -> bool:

@@ -60,6 +60,10 @@ class Region:
         """Whether a point, shape (2,) [m], lies inside."""
         return bool(self.depths(point[None])[0] > 0.0)
 
+    def near(self, point: FloatArray, room: float) -> bool:
+        """Whether a point, shape (2,), lies inside, or no further than some room from it [m]."""
+        return bool(self.depths(point[None])[0] >= -room)
+
     def depths(self, points: FloatArray) -> FloatArray:
         """Signed distances from the boundary, positive inside (even-odd rule); shape (k, 2) to (k,) [m]."""
         return self._boundary.batch(points)

@@ -11,12 +11,13 @@ import numpy as np
 from shapely import MultiPolygon, Polygon
 
 from coop_drake.answers.mixed_cell import MixedCell
-from coop_drake.answers.problem import PlanningProblem
+from coop_drake.answers.problem import PlanningProblem, goal_box
 from coop_drake.geometry.body_pairs import BodyPairs
 from coop_drake.geometry.minkowski import to_polygon
 from coop_drake.geometry.swept_tree import Intervals, SweptTree
 from coop_drake.planning.cells.cell_graph import CellGraph, GraphCell, Kind
 from coop_drake.planning.cells.cells import CellMaker, Region
+from coop_drake.planning.cells.ends import end_in
 from coop_drake.planning.cells.events import (
     ChannelSearched,
     Event,
@@ -28,7 +29,7 @@ from coop_drake.planning.cells.events import (
     Watch,
     seen,
 )
-from coop_drake.planning.cells.slices import Slices, holds
+from coop_drake.planning.cells.slices import Slices, holds, meets
 from coop_drake.planning.cells.split_rules import SplitOrder, finest_widths
 from coop_drake.planning.travel_time import SETTLING_TIME
 
@@ -240,13 +241,22 @@ class Exploration(Subdivision):
         self._added(index, self.graph.by_slice[index])
 
     def _note_ends(self, index: int, intervals: Intervals) -> None:
-        """Record which cells of a new leaf hold the start and which hold the goal."""
-        cells = self.graph.by_slice[index]
-        start, goal = self._problem.start, self._problem.goal_pose
-        if holds(intervals, [float(angle) for angle in start[2:]], self.slices.circular):
+        """Record which cells of a new leaf hold the start, and in which a path may end.
+
+        That is all that share a point with the goal; of those that are free the ones with room for an end.
+        """
+        cells, problem, circular = self.graph.by_slice[index], self._problem, self.slices.circular
+        start, goal, room = problem.start, problem.goal_pose, problem.position_tolerance
+        if holds(intervals, [float(angle) for angle in start[2:]], circular):
             self._starts[index] = [cell for cell in cells if cell.region.holds(start[:2])]
-        if holds(intervals, [float(goal[2]), *self._problem.goal_joints], self.slices.circular):
-            self._goals[index] = [cell.index for cell in cells if cell.region.holds(goal[:2])]
+        if meets(intervals, goal_box(problem), circular):
+            free = self.slices.expanded(intervals)
+            self._goals[index] = [
+                cell.index
+                for cell in cells
+                if cell.region.near(goal[:2], room)
+                and (cell.kind is not Kind.FREE or end_in(problem, free, cell.region) is not None)
+            ]
 
 
 def _free_weight(region: Region) -> float:

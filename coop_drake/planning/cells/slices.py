@@ -99,6 +99,10 @@ class Slices:
         ]
         return (grown[0], *clipped)
 
+    def meeting(self, box: Intervals) -> list[int]:
+        """Leaves whose closed nominal intervals share a point with a box of (theta, q...)."""
+        return [i for i in self.leaves() if meets(self.all[i].intervals, box, self.circular)]
+
     def holding(self, angles: Sequence[float | None]) -> list[int]:
         """Leaves whose closed nominal intervals hold the angles (theta, q...); None is not tested."""
         return [i for i in self.leaves() if holds(self.all[i].intervals, angles, self.circular)]
@@ -122,6 +126,11 @@ def holds(intervals: Intervals, angles: Sequence[float | None], circular: Sequen
         if abs(offset) > half + TOUCH:
             return False
     return True
+
+
+def meets(first: Intervals, second: Intervals, circular: Sequence[bool]) -> bool:
+    """Whether two boxes of (theta, q...) share a point, on circular axes modulo 2 pi."""
+    return _touches(first, second, circular) is not None
 
 
 def interval_overlap(first: Interval, second: Interval, periodic: bool = False) -> float:

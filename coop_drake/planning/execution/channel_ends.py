@@ -9,14 +9,14 @@ from math import inf, tau
 import numpy as np
 from shapely import Point
 
-from coop_drake.answers.problem import PlanningProblem
+from coop_drake.answers.problem import PlanningProblem, goal_box
 from coop_drake.errors import PlanError
 from coop_drake.planning.boxes.channel import Channel
 from coop_drake.tree.circles import nearest_turn
 from coop_drake.tree.pose import FloatArray
 
 GOAL_FRACTION = 0.9
-"""Fraction of a tolerance that a goal interval takes, so that its edges are within tolerance [-]."""
+"""Fraction of the goal's intervals that a plan ends in, so that it is within tolerance at their edges [-]."""
 
 Bounds = tuple[FloatArray, FloatArray]
 """Lower and upper ends of (theta, q...), shape (1 + n,) each [rad, m]."""
@@ -45,11 +45,13 @@ def final_intervals(problem: PlanningProblem, values: Sequence[float | None]) ->
         problem: What was asked.
         values: The values there, see ``goal_values``.
     """
-    tolerances = (problem.angle_tolerance, *[problem.joint_tolerance] * len(problem.goal_joints))
-    goals = list(zip(values, tolerances, strict=True))
-    lower = [-inf if goal is None else goal - GOAL_FRACTION * tolerance for goal, tolerance in goals]
-    upper = [inf if goal is None else goal + GOAL_FRACTION * tolerance for goal, tolerance in goals]
-    return np.array(lower), np.array(upper)
+    goals = (float(problem.goal_pose[2]), *problem.goal_joints)
+    lower, upper = np.full(len(goals), -inf), np.full(len(goals), inf)
+    for axis, ((low, high), goal, value) in enumerate(zip(goal_box(problem), goals, values, strict=True)):
+        if goal is not None and value is not None:
+            spare, turned = 0.5 * (1.0 - GOAL_FRACTION) * (high - low), value - goal
+            lower[axis], upper[axis] = low + spare + turned, high - spare + turned
+    return lower, upper
 
 
 def goal_intervals(problem: PlanningProblem, channel: Channel, index: int) -> Bounds:

@@ -3,17 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from math import pi
+from math import cos, pi
 
 import numpy as np
 import shapely
-from shapely import Point, Polygon
+from shapely import MultiPolygon, Point, Polygon
 
-from coop_drake.answers.problem import PlanningProblem
+from coop_drake.answers.problem import PlanningProblem, goal_box
 from coop_drake.answers.proof import InfeasibilityProof, OverCell, OverSlice, Witness
+from coop_drake.geometry.convex import normals
+from coop_drake.geometry.minkowski import FreeSpace
 from coop_drake.geometry.swept_tree import Interval, Intervals
 from coop_drake.planning.cells.slices import halves
+from coop_drake.planning.proofs.proof_making import FAILURES, Floor
 from coop_drake.planning.proofs.witnesses import Witnesses
+from coop_drake.planning.questions.floor_near import EXTRA_FLOOR
+from coop_drake.tree.pose import FloatArray
 
 NEAR_GOAL = (1e-3, 1e-5, 1e-7)
 """Slices about the goal reach so far from the goals of theta and joints, in the order tried [rad or m]."""
@@ -21,28 +26,35 @@ NEAR_GOAL = (1e-3, 1e-5, 1e-7)
 LEAST_DEPTH = 1e-8
 """A goal less deep inside the positions that are in collision counts as touching only [m]."""
 
+CORNERS = (4, 16, 64, 256, 1024)
+"""Corners of the polygon about the goal's positions, the fewest that keep enough distance from them [-]."""
+
+TINY = 1e-12
+"""The edges of this polygon are further from the goal than the tolerance, by more than is rounded [m]."""
+
 MOST_SLICES = 1024
 """Slices away from the goal that are made at most, until in each a piece is known to hold a polygon [-]."""
 
 
 def blocked_goal_proof(
-    problem: PlanningProblem, boxes: Sequence[Intervals], witnesses: Witnesses
+    problem: PlanningProblem, boxes: Sequence[Intervals], floor: MultiPolygon, witnesses: Witnesses
 ) -> InfeasibilityProof | None:
-    """Write down that the team is in collision at its goal.
+    """Write down that the team is in collision all over its goal.
 
     Slices about the goal have one cell, which leaves out positions about the goal's; all others have one cell
     that leaves out nothing.
 
     Args:
         problem: The question with the robots that are kept.
-        boxes: Boxes that cover the free joints' limits, with the goal's theta and joints on the other axes:
-            in each of them the team is in collision at the goal's position.
+        boxes: Boxes that cover ``goal_box``, in each of which the team is in collision at all of the goal's
+            positions; none if the goal of a joint is beyond its limits.
+        floor: The floor that the team may meet at the goal.
         witnesses: Makes what shows collisions.
 
     Returns:
         The proof, None if the team is not known to be in collision by more than a touch.
     """
-    writer = _Writer(problem, witnesses)
+    writer = _Writer(problem, floor, witnesses)
     for near in NEAR_GOAL:
         whole, goal = writer.ranges(near)
         parts = [writer.near_goal(box, goal) for box in boxes] if len(goal) == len(whole) else []
@@ -55,48 +67,48 @@ def blocked_goal_proof(
 
 
 class _Writer:
-    def __init__(self, problem: PlanningProblem, witnesses: Witnesses) -> None:
-        self._problem, self._witnesses, self._floor = problem, witnesses, problem.workspace
+    def __init__(self, problem: PlanningProblem, floor: MultiPolygon, witnesses: Witnesses) -> None:
+        self._witnesses, self._floor, self._box = witnesses, Floor(FreeSpace.over(floor)), goal_box(problem)
+        self._circular = problem.tree.circular
+        self._ranges = [(-pi, pi), *[joint.range for joint in problem.tree.joints]]
+        self._goal, self._room = problem.goal_pose[:2], problem.position_tolerance
         self._reach = problem.tree.reach
-        known = shapely.union(self._floor.envelope, Point(problem.goal_pose[:2]))
+        known = shapely.union(problem.workspace.envelope, Point(self._goal).buffer(self._room))
         (x0, y0, x1, y1), most = known.bounds, 3.0 * self._reach
         self._everywhere = shapely.box(x0 - most, y0 - most, x1 + most, y1 + most)
-        rings = (self._floor.exterior, *self._floor.interiors)
-        self._walls = [pair for ring in rings for pair in zip(ring.coords[:-1], ring.coords[1:], strict=True)]
 
     def ranges(self, near: float) -> tuple[Intervals, Intervals]:
         """The ranges of all axes, and what is near the goal, up to an axis with nothing near it.
 
         Where a circular axis has a goal, its range is the turn that begins with what is near the goal.
         """
-        joints, whole, goal = self._problem.tree.joints, list[Interval](), list[Interval]()
-        aims = (float(self._problem.goal_pose[2]), *self._problem.goal_joints)
-        ranges = ((-pi, pi), *(joint.range for joint in joints))
-        for (lower, upper), aim, circular in zip(ranges, aims, self._problem.tree.circular, strict=True):
-            if circular and aim is not None:
-                lower = aim - near
-                upper = float(np.nextafter(lower + 2.0 * pi, aim))
+        whole, goal = list[Interval](), list[Interval]()
+        for (low, high), (lower, upper), circular in zip(
+            self._box, self._ranges, self._circular, strict=True
+        ):
+            if circular and high - low < 2.0 * pi:
+                lower = low - near
+                upper = float(np.nextafter(lower + 2.0 * pi, lower))
             whole.append((lower, upper))
-            low, high = (-np.inf, np.inf) if aim is None else (aim - near, aim + near)
-            if len(goal) + 1 == len(whole) and max(lower, low) <= min(upper, high):
-                goal.append((max(lower, low), min(upper, high)))
+            if len(goal) + 1 == len(whole) and low <= high:
+                goal.append((max(low - near, lower), min(high + near, upper)))
         return tuple(whole), tuple(goal)
 
     def near_goal(self, box: Intervals, goal: Intervals) -> OverSlice | None:
-        """A slice about the goal; None if the goal's position is not in collision in all of it."""
-        aims = (self._problem.goal_pose[2], *self._problem.goal_joints)
-        ends = zip(box, goal, aims, strict=True)
-        intervals = tuple(own if aim is None else near for own, near, aim in ends)
+        """A slice about a part of the goal; None if not all positions are in collision in all of it."""
+        ends = zip(box, self._box, goal, strict=True)
+        intervals = tuple(
+            (near[0] if own[0] == all_[0] else own[0], near[1] if own[1] == all_[1] else own[1])
+            for own, all_, near in ends
+        )
         overlaps = self._witnesses.overlaps(intervals)
         if overlaps:
             return OverSlice(*self._witnesses.ends(intervals), overlaps, ())
         sweeps = self._witnesses.inner_sweeps(intervals, 0.0)
-        depth = max(map(self._depth, sweeps), default=0.0)
-        if depth < LEAST_DEPTH:
+        left_out = self._left_out(sweeps)
+        if left_out is None:
             return None
-        (x, y), half = self._problem.goal_pose[:2], min(0.5 * depth, self._reach)
-        left_out = shapely.box(x - half, y - half, x + half, y + half)
-        cell = OverCell(True, Polygon(self._everywhere.exterior, [left_out.exterior]))
+        cell = OverCell(True, Polygon(self._everywhere.exterior, [left_out]))
         return OverSlice(*self._witnesses.ends(intervals), sweeps, (cell,))
 
     def rest(self, whole: Intervals, goal: Intervals) -> list[OverSlice] | None:
@@ -115,21 +127,22 @@ class _Writer:
                 left.extend(halves(intervals, widths.index(max(widths))))
         return None
 
-    def _depth(self, witness: Witness) -> float:
-        """How deep the goal's position is in the positions that a polygon forbids, zero outside [m]."""
-        goal = self._problem.goal_pose[:2]
-        if self._floor.is_empty:
-            return float("inf")
-        middle = Point(goal + witness.polygon.mean(axis=0))
-        depths = [0.0 if self._floor.covers(middle) else self._floor.distance(middle)]
-        held = Polygon(goal + witness.polygon)
-        for wall in self._walls:
-            if held.intersects(shapely.LineString(wall)):
-                corners = (np.array(wall)[:, None] - witness.polygon).reshape(-1, 2)
-                forbidden = shapely.MultiPoint(corners).convex_hull
-                inside = forbidden.contains(Point(goal))
-                depths.append(forbidden.boundary.distance(Point(goal)) if inside else 0.0)
-        return max(depths)
+    def _left_out(self, sweeps: Sequence[Witness]) -> FloatArray | None:
+        """A polygon about the goal's positions, all of which the sweeps forbid; None if they do not by a bit.
+
+        Its corners lie halfway between the disc of the goal's positions and the nearest that is left free.
+        """
+        try:
+            free = self._floor.not_forbidden(sweeps)
+        except FAILURES:
+            return None
+        depth = min([-float(region.depths(self._goal[None])[0]) for region in free], default=np.inf)
+        radius = self._room + min(0.5 * (depth - self._room), self._reach, EXTRA_FLOOR)
+        for corners in CORNERS:
+            if depth - self._room > LEAST_DEPTH and radius * cos(pi / corners) > self._room + TINY:
+                polygon: FloatArray = radius * normals(np.linspace(0.0, 2.0 * pi, corners, endpoint=False))
+                return self._goal + polygon
+        return None
 
 
 def _around(whole: Intervals, goal: Intervals) -> Iterator[Intervals]:

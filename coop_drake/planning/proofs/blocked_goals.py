@@ -1,4 +1,4 @@
-"""Goal poses at which the team is in collision for all values of its free joints."""
+"""Goals at which the team is in collision, within all tolerances and for all values of its free joints."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import shapely
 from shapely import MultiPolygon
 from shapely.errors import ShapelyError
 
-from coop_drake.answers.problem import PlanningProblem, at_goal
+from coop_drake.answers.problem import PlanningProblem, at_goal, goal_box
 from coop_drake.answers.proof import InfeasibilityProof
 from coop_drake.geometry.body_pairs import BodyPairs
 from coop_drake.geometry.swept_tree import Intervals, SweptTree
@@ -27,7 +27,7 @@ BUDGET = 128
 
 
 def blocked_goal(problem: PlanningProblem) -> tuple[InfeasibilityProof | None, int]:
-    """Prove by under-sweeps that the team is in collision at its goal pose, whatever its free joints are.
+    """Prove by under-sweeps that the team is in collision all over its goal, whatever its free joints are.
 
     The object is tested first, then each robot alone, then the team: if some of the bodies collide, so
     does the team.
@@ -42,13 +42,13 @@ def blocked_goal(problem: PlanningProblem) -> tuple[InfeasibilityProof | None, i
     slices = 0
     for chosen in dict.fromkeys([(), *[(robot,) for robot in robots], tuple(robots)]):
         question = relaxed(problem, chosen)[0]
-        swept = SweptTree(question.tree)
+        swept, floor = SweptTree(question.tree), _floor_at_goal(question)
         pairs = BodyPairs(swept)
-        boxes, made = _blocked(question, CellMaker(swept, pairs, _floor_at_goal(question)))
-        slices += made
         beyond = goal_beyond_limits(question) is not None
+        boxes, made = ([], 0) if beyond else _blocked(question, CellMaker(swept, pairs, floor))
+        slices += made
         if boxes or beyond:
-            proof = blocked_goal_proof(question, boxes, Witnesses(problem.tree, swept, pairs))
+            proof = blocked_goal_proof(question, boxes, floor, Witnesses(problem.tree, swept, pairs))
             if proof is not None:
                 return proof, slices
     return None, slices
@@ -74,26 +74,22 @@ def touch_at_goal(problem: PlanningProblem) -> str | None:
 
 
 def _floor_at_goal(question: PlanningProblem) -> MultiPolygon:
-    """The part of the floor that the team may meet at its goal pose; all of it if geometry fails."""
+    """The part of the floor that the team may meet at its goal; all of it if geometry fails."""
+    reach = question.tree.reach + question.position_tolerance
     try:
-        near = nearby(question.workspace, question.goal_pose[None, :2], question.tree.reach)
+        near = nearby(question.workspace, question.goal_pose[None, :2], reach)
     except ShapelyError:  # The floor crosses itself.
         near = MultiPolygon()
     return shrunk(question.workspace, 0.0) if near.is_empty else near
 
 
 def _blocked(question: PlanningProblem, maker: CellMaker) -> tuple[list[Intervals], int]:
-    """Boxes that cover all values of the free joints, in each of which the team is in collision at the goal.
+    """Boxes that cover ``goal_box``, in each of which the team is in collision at all positions of the goal.
 
-    The free joints' intervals are halved until all are blocked, one is free, or the budget is spent; only in
-    the first case boxes are returned. The second result is the number of slices swept.
+    Intervals are halved until all are blocked, one is free, or the budget is spent; only in the first case
+    boxes are returned. The second result is the number of slices swept.
     """
-    angle = float(question.goal_pose[2])
-    joints = [
-        joint.range if goal is None else (goal, goal)
-        for joint, goal in zip(question.tree.joints, question.goal_joints, strict=True)
-    ]
-    left: list[Intervals] = [((angle, angle), *joints)]
+    left: list[Intervals] = [goal_box(question)]
     blocked: list[Intervals] = []
     for made in range(1, BUDGET + 1):
         intervals = left.pop()
@@ -111,4 +107,4 @@ def _blocked(question: PlanningProblem, maker: CellMaker) -> tuple[list[Interval
 
 
 def _held(regions: list[Region], question: PlanningProblem) -> bool:
-    return any(region.holds(question.goal_pose[:2]) for region in regions)
+    return any(region.near(question.goal_pose[:2], question.position_tolerance) for region in regions)

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from math import pi
+from math import cos, pi
 
 import numpy as np
 import shapely
 from shapely.geometry.base import BaseGeometry
 
-from coop_drake.answers.problem import PlanningProblem
+from coop_drake.answers.problem import PlanningProblem, goal_box
 from coop_drake.answers.proof import InfeasibilityProof
 from coop_drake.geometry.convex import normals
 from coop_drake.geometry.minkowski import FreeSpace, to_polygon
@@ -17,6 +17,7 @@ from coop_drake.geometry.piece_sweeps import over_piece
 from coop_drake.planning.cells.cells import regions_of
 from coop_drake.planning.proofs.proof_making import disc_proof
 from coop_drake.planning.proofs.witnesses import LEAST_LOSS
+from coop_drake.planning.questions.margins import ARC_SEGMENTS
 from coop_drake.planning.questions.relaxation import inscribed_disc
 from coop_drake.tree.component_tree import ComponentTree, ConvexShape
 from coop_drake.tree.pose import FloatArray
@@ -64,17 +65,10 @@ def _discs(tree: ComponentTree) -> Iterator[tuple[int, int, ConvexShape]]:
 
 def _places(problem: PlanningProblem, component: int, centre: FloatArray) -> BaseGeometry:
     """A convex polygon that holds all places in W where a point of a component can be at the goal."""
-    tree = problem.tree
-    angle = float(problem.goal_pose[2])
-    bounds = np.array(
-        [(angle, angle)]
-        + [
-            joint.range if goal is None else (goal, goal)
-            for joint, goal in zip(tree.joints, problem.goal_joints, strict=True)
-        ]
-    )
+    tree, bounds = problem.tree, np.array(goal_box(problem))
     point = tree.arrays._replace(pieces=np.array([[component, 0, 1]]), vertices=centre[None, :].copy())
     ring = over_piece(
         point, 0, bounds[:, 0].copy(), bounds[:, 1].copy(), len(tree.ancestors[component]), False
     )
-    return shapely.MultiPoint(ring + problem.goal_pose[:2]).convex_hull
+    places = shapely.MultiPoint(ring + problem.goal_pose[:2]).convex_hull
+    return places.buffer(problem.position_tolerance / cos(pi / (4.0 * ARC_SEGMENTS)), quad_segs=ARC_SEGMENTS)

@@ -15,7 +15,7 @@ from shapely import Point, Polygon
 from shapely.errors import ShapelyError
 from shapely.geometry.base import BaseGeometry
 
-from coop_drake.answers.problem import PlanningProblem
+from coop_drake.answers.problem import PlanningProblem, goal_box
 from coop_drake.answers.proof import InfeasibilityProof, OverCell, OverSlice, Squeeze, Witness
 from coop_drake.errors import GeometryError
 from coop_drake.geometry.minkowski import FreeSpace, to_polygon
@@ -44,7 +44,7 @@ TOUCHING = 1e-6
 LEAST_OVERLAP = 1e-5
 """Squeezed pieces forbid positions at least so far beyond what else is left free [m]: they must overlap."""
 
-_FAILURES = ShapelyError, GeometryError, ValueError
+FAILURES = ShapelyError, GeometryError, ValueError
 """What failing geometry raises."""
 
 
@@ -70,14 +70,14 @@ def slices_proof(
         leaf: [other for other in sorted(slices.all[leaf].neighbours) if other > leaf] for leaf in leaves
     }
     starts = set(slices.holding([float(angle) for angle in question.start[2:]]))
-    goals = set(slices.holding([float(question.goal_pose[2]), *question.goal_joints]))
+    goals = set(slices.meeting(goal_box(question)))
 
-    start, goal = Point(question.start[:2]), Point(question.goal_pose[:2])
-    floor = _Floor(FreeSpace.over(question.workspace))
+    start, goal, room = Point(question.start[:2]), Point(question.goal_pose[:2]), question.position_tolerance
+    floor = Floor(FreeSpace.over(question.workspace))
     try:
         polygons = {leaf: [to_polygon(region.section) for region in its] for leaf, its in regions.items()}
-        most = GROWN_SHARE * _Graph(polygons, joined, start, starts).apart(goal, goals)
-    except _FAILURES:
+        most = GROWN_SHARE * _Graph(polygons, joined, start, starts).apart(goal, room, goals)
+    except FAILURES:
         most = max(GROWTHS)
 
     def separated(growth: float) -> list[OverSlice] | None:
@@ -92,7 +92,7 @@ def slices_proof(
             cells[leaf] = _grown(left, growth)
         labels = _Graph(cells, joined, start, starts).reached
         if any(
-            label and cell.dwithin(goal, TOUCHING)
+            label and cell.dwithin(goal, room + TOUCHING)
             for leaf in goals
             for cell, label in zip(cells[leaf], labels[leaf], strict=True)
         ):
@@ -155,14 +155,14 @@ def _first(separated: Callable[[float], Found | None], growths: Sequence[float])
     for growth in growths:
         try:
             found = separated(growth)
-        except _FAILURES:
+        except FAILURES:
             continue
         if found is not None:
             return found
     return None
 
 
-class _Floor:
+class Floor:
     """Positions on a floor that witnesses leave free; those of a witness that slices share are kept.
 
     Args:
@@ -243,11 +243,12 @@ class _Graph:
         reached = set[int]().union(*(nx.node_connected_component(graph, k) for k in first))
         self.reached = {leaf: [k in reached for k in its] for leaf, its in self._places.items()}
 
-    def apart(self, goal: Point, goals: set[int]) -> float:
+    def apart(self, goal: Point, room: float, goals: set[int]) -> float:
         """Twice the least growth of all cells that would join the start to a goal or to further cells [m].
 
         Args:
             goal: Where paths end.
+            room: How far from there they may end [m].
             goals: Leaves that hold the angles at the goal.
         """
         labels = np.array([label for its in self.reached.values() for label in its], dtype=bool)
@@ -258,6 +259,6 @@ class _Graph:
         new = self._first[~labels[self._first]]
         one, other = self._polygons[pairs.T]
         between = shapely.distance(one, other)
-        to_goal = shapely.distance(self._polygons[ends], goal)
+        to_goal = shapely.distance(self._polygons[ends], goal) - room
         to_start = shapely.distance(self._polygons[new], self._start)
         return float(np.concatenate((between, 2.0 * to_goal, 2.0 * to_start)).min(initial=np.inf))

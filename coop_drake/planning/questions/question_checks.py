@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import shapely
 
-from coop_drake.answers.problem import ROUNDING, PlanningProblem
+from coop_drake.answers.problem import ROUNDING, PlanningProblem, goal_box
 from coop_drake.errors import PlanError
 from coop_drake.tree.component_tree import TreeJoint
 from coop_drake.tree.pose import FloatArray
@@ -45,11 +45,13 @@ def check_question(problem: PlanningProblem) -> None:
 
 
 def goal_beyond_limits(problem: PlanningProblem) -> str | None:
-    """A sentence that names the joint whose goal is beyond its limits; None if there is no such joint."""
-    for joint in problem.tree.joints:
-        goal = problem.goal_joints[joint.index]
-        if goal is not None and not _within(goal, joint):
-            return f"at the goal {joint.name} is {goal}, beyond its limits [{joint.lower}, {joint.upper}]"
+    """A sentence that names a joint whose goal is beyond its limits by more than its tolerance, or None."""
+    for joint, (low, high) in zip(problem.tree.joints, goal_box(problem)[1:], strict=True):
+        if low > high:
+            goal, limits = problem.goal_joints[joint.index], f"[{joint.lower}, {joint.upper}]"
+            return (
+                f"at the goal {joint.name} is {goal}, beyond its limits {limits} by more than its tolerance"
+            )
     return None
 
 

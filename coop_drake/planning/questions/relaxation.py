@@ -40,6 +40,7 @@ def relaxed(problem: PlanningProblem, robots: Collection[int]) -> tuple[Planning
         tree=ComponentTree(components, tree.unchecked_pairs),
         start=np.concatenate((problem.start[:3], problem.start[3:][joints])),
         goal_joints=tuple(problem.goal_joints[index] for index in joints),
+        joint_tolerance=np.broadcast_to(problem.joint_tolerance, len(tree.joints))[joints],
         limits=TeamLimits(),
     )
     return question, tuple(joints)

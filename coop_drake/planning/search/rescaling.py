@@ -57,6 +57,7 @@ class Rescaling:
             goal_pose=problem.goal_pose * units[:3],
             goal_joints=tuple(None if goal is None else float(goal * unit) for goal, unit in goals),
             position_tolerance=scale * problem.position_tolerance,
+            joint_tolerance=problem.joint_tolerance * units[3:],
             settings=_settings(problem.settings, scale),
             limits=TeamLimits(),
         )
@@ -129,7 +130,8 @@ class Rescaling:
         boxes = tuple(self._scaled_box(box, self._units[2:], "polygon", "core") for box in found.boxes)
         path = None if found.path is None else found.path * self._units
         ends = None if found.ends is None else found.ends * self.unit
-        return replace(found, boxes=boxes, margin=self.unit * found.margin, path=path, ends=ends)
+        end = None if found.end is None else found.end * self._units
+        return replace(found, boxes=boxes, margin=self.unit * found.margin, path=path, ends=ends, end=end)
 
     def watched(self, watch: Watch | None) -> Watch | None:
         """A function that expresses every event in metres before it is passed on."""

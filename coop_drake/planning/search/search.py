@@ -22,6 +22,7 @@ from coop_drake.answers.search_report import SearchReport
 from coop_drake.errors import GeometryError, PatienceError
 from coop_drake.planning.boxes.boxes import explored_channel
 from coop_drake.planning.boxes.channel import Channel, CoveredPath, NoChannel, middle_of
+from coop_drake.planning.cells.ends import within_limits
 from coop_drake.planning.cells.events import Watch
 from coop_drake.planning.cells.exploration import Verdict
 from coop_drake.planning.copies import Copies
@@ -30,6 +31,7 @@ from coop_drake.planning.proofs.clearance_bound import clearance_bound
 from coop_drake.planning.proofs.enclosed_ends import refuted_at_an_end
 from coop_drake.planning.proofs.proof_search import Proofs
 from coop_drake.planning.questions.question_checks import check_question, goal_beyond_limits
+from coop_drake.planning.sampling.free_ends import ending_freely
 from coop_drake.planning.search.attempt import BoxSequence, Tried
 from coop_drake.planning.search.cell_search import search_by_cells
 from coop_drake.planning.search.rescaling import Rescaling
@@ -161,7 +163,7 @@ class _Search:
         self._began, self._unit, self._route = thread_time(), unit, route
         self._first_plan: float | None = None
         self._problem, self._progress, self._watch, self._workers = problem, progress, watch, workers
-        self._samples = SampledSearch(problem, route)
+        self._samples = SampledSearch(within_limits(problem), route)
         self._proofs = Proofs(problem, watch)
         self._other_slices = self._narrow_attempts = 0
 
@@ -182,9 +184,16 @@ class _Search:
         blocked, slices = blocked_goal(self._problem)
         self._other_slices += slices
         if blocked:
-            return NoChannel(
-                True, "at the goal pose the team is in collision for all values of its free joints", blocked
+            reason = (
+                "at the goal, within all its tolerances, the team collides for all values of its free joints"
             )
+            return NoChannel(True, reason, blocked)
+        elsewhere = ending_freely(self._problem)
+        if elsewhere is not None:
+            self._samples = SampledSearch(elsewhere)
+            found = self._sampled(1)
+            if found is not None:
+                return self._with_margin(found)
         refutation, slices = refuted_at_an_end(self._problem, self._watch)
         self._other_slices += slices
         if refutation is not None:

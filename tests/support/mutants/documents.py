@@ -201,13 +201,11 @@ def json_mutants(document: Document, seed: int) -> Iterator[Mutant]:
 
 def plan_mutants(document: Document) -> Iterator[Mutant]:
     """Plans that cannot be executed, or that answer another question."""
-    last = len(document["cells"]) - 1
     for k, cell in enumerate(document["cells"]):
         far = [[x + 50.0, y] for x, y in cell["tidied"]["outer"]]
         place = ("cells", k, "tidied")
         entry: Place = ("transitions", k - 1, "target") if k else ("start",)
-        end: Place = ("goal_pose",) if k == last else entry
-        yield _plan(document, "cell elsewhere", (*place, "outer"), far, "it is 50 m off", end)
+        yield _plan(document, "cell elsewhere", (*place, "outer"), far, "it is 50 m off", entry)
         for name in ("lower", "upper"):
             other = cell["upper" if name == "lower" else "lower"]
             place = ("cells", k, name)
@@ -232,7 +230,7 @@ def plan_mutants(document: Document) -> Iterator[Mutant]:
     for index in range(3):
         moved = [value + 20.0 * (i == index) for i, value in enumerate(goal)]
         yield _plan(
-            document, "goal elsewhere", ("goal_pose",), moved, "it is outside the last cell", ("goal_pose",)
+            document, "goal elsewhere", ("goal_pose",), moved, "the scenario has another", ("goal_pose",)
         )
     names = [f"{name}_b" for name in document["joint_names"]]
     yield _plan(document, "other joints", ("joint_names",), names, "the team has others", ("joint_names",))
