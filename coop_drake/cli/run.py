@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
+from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
@@ -35,7 +36,13 @@ from coop_drake.cli.options import (
 from coop_drake.cli.plan import plan_of
 from coop_drake.cli.reporter import ExitCode, Reporter, reporting
 from coop_drake.cli.results import ResultFolder
-from coop_drake.cli.summary import process_lines, simulation_facts, summary_rows
+from coop_drake.cli.summary import (
+    beyond_budget,
+    budget_facts,
+    process_lines,
+    simulation_facts,
+    summary_rows,
+)
 from coop_drake.cli.task import Task, read_task
 from coop_drake.nodes.states import REJOIN, RESTARTS
 from coop_drake.viz.drawing_processes import DrawingProcesses
@@ -187,7 +194,9 @@ def carry_out(
         reporter.complain(log.violation)
     elif not log.reached:
         reporter.complain(f"the goal was not reached within {log.times[-1]:.1f} s of simulated time")
-    return ExitCode.DONE if log.reached and not log.violation else ExitCode.FAILED_RUN
+    if exceeded := beyond_budget(reporter.facts):
+        reporter.complain(exceeded)
+    return ExitCode.DONE if reporter.facts["outcome"] == "arrived" else ExitCode.FAILED_RUN
 
 
 def _warn_of_unknown_limits(reporter: Reporter) -> None:
@@ -213,4 +222,9 @@ def _simulate(
     with reporter.stage("simulating", "simulation") as progress:
         log = simulation(task.scenario, plan, maps, progress=progress, observer=observer)
     reporter.facts.update(simulation_facts(plan, log, task.problem), peak_memory_mb=peak_memory_mb())
+    # Where drives braked, nominal motions began anew.
+    braked = min((stop["since"] for stop in reporter.facts.get("stops", ())), default=inf)
+    reporter.facts.update(budget_facts(plan, log, braked))
+    if reporter.facts["outcome"] == "arrived" and beyond_budget(reporter.facts):
+        reporter.facts["outcome"] = "arrived, beyond its budget"
     return log

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
-from math import pi, remainder
+from math import inf, pi, remainder
 from string import Formatter
 from typing import TYPE_CHECKING, Any
 
@@ -30,6 +30,7 @@ _ROWS = (
     ("peak base force", "{peak_base_wrench_n:.1f} N"),
     ("nearest to a limit of speed", "{nearest_to_a_limit}"),
     ("error at the end", "{final_position_error_m:.4f} m, {final_angle_error_rad:.4f} rad"),
+    ("used of the plan's budget", "{budget_used:.0%}: {budget_used_by} at {budget_used_at:.2f} s"),
 )
 """Label and format, with the names of its facts, of every row of the closing table, in its order. A row has a
 place where all its facts are known."""
@@ -170,6 +171,30 @@ def map_facts(maps: Sequence[HarmonicMap]) -> dict[str, Any]:
         "max_map_unknowns": max(certificate.unknowns for certificate in certificates),
         "max_map_condition": max(certificate.condition for certificate in certificates),
     }
+
+
+def budget_facts(plan: Plan, log: SimulationLog, until: float = inf) -> dict[str, Any]:
+    """Return how much of a plan's budget a run used until some time [s], nothing without one."""
+    from coop_drake.verification.runs import Rows, largest_departure
+
+    largest = largest_departure(Rows(log, plan), until)
+    if largest is None:
+        return {}
+    return {
+        "budget_used": largest.share,
+        "budget_used_by": largest.what,
+        "budget_used_at": largest.time,
+    }
+
+
+def beyond_budget(facts: Mapping[str, Any]) -> str:
+    """Return in a sentence which stated departure a run exceeded, empty if none."""
+    if not facts.get("budget_used", 0.0) > 1.0:
+        return ""
+    return (
+        "{budget_used_by} departed by {budget_used:.2f} times what the plan's budget states, at t = "
+        "{budget_used_at:.6g} s"
+    ).format_map(facts)
 
 
 def simulation_facts(plan: Plan, log: SimulationLog, problem: PlanningProblem) -> dict[str, Any]:

@@ -1,23 +1,21 @@
 """When a sampled robot says that the goal is reached: by the pose and the joints that it measures, averaged.
 
-A robot remembers what it measured, raw, in two times of ``MEAN_TIME``, one after the other, W samples each. With
-their means m_0 and m_1, the newer ones' standard deviation s, and d^2 half the mean square of the differences
-of one to the next, it has arrived where
+A robot remembers what it measured, raw, in two times of ``MEAN_TIME``, one after the other, W samples each.
+With their means m_0 and m_1, the newer ones' standard deviation s, and d^2 half the mean square of the
+differences of one to the next, it has arrived where
 
     |m_1 - goal| <= tolerance - max(e, e_s),  |m_1 - m_0| <= r + 2 (e + e_s),  s^2 <= 2.5 d^2 + (r + e)^2.
 
-e is the certified error of what it measures, or a tenth of the tolerance (erratum E17b) if that is more, which
-counts in the first inequality alone. e_s = c s / root W is the error of the mean by how the samples scatter, and
-r what counts as rest in ``MEAN_TIME``. In noise that is independent from sample to sample s and d are alike; s
-is the larger one where the object moves to and fro. What all samples have in common, as a bias, does not show.
+e is the certified error of what it measures; in the first inequality a tenth of the tolerance counts where
+that is more (erratum E17b). e_s = c s / root W is the error of the mean by how the samples scatter, and r
+what counts as rest in ``MEAN_TIME``. In noise that is independent from sample to sample s and d are alike; s
+is larger where the object moves to and fro. What all samples have in common, as a bias, does not show.
 """
 
 from __future__ import annotations
 
 from math import hypot, inf, isnan, sqrt
 from typing import NamedTuple
-
-import numpy as np
 
 from coop_drake.compiled import compiled
 from coop_drake.laws.readiness import EROSION, RATE_TOLERANCE, SPEED_TOLERANCE
@@ -73,7 +71,7 @@ def arrival_margin(
         place: This and the next two arguments are the fields of an ``ArrivalGoal``; see there.
         tolerances: The tolerances.
         errors: The certified errors.
-        recent: (x, y, theta, own joints) as measured at the last 2 W samples, NaN where there were not so many,
+        recent: (x, y, theta, own joints) as measured at the last 2 W samples, NaN where there were fewer,
             shape (2 W, 3 + n) [m, rad].
         newest: The row of the newest ones; the older ones stand before it, the last row before the first.
     """

@@ -42,8 +42,9 @@ def noisy_run():
 def test_a_noisy_late_and_wrong_team_stays_in_the_tube():
     scenario, plan, log = noisy_run()
     assert (log.reached, log.violation) == (True, "")
-    (used,) = check_budget_used(Rows(log, plan))
+    used, fast = check_budget_used(Rows(log, plan))
     assert 0.01 < used.tightest < 0.6
+    assert 0.01 < fast.tightest < 0.6
     assert log.governor_spread.max() == 0.0
     assert verified_run(scenario, plan, log).answer == "arrived"
     rest = np.linalg.norm(log.object_pose[-1, :2] - plan.goal_pose[:2])
@@ -55,9 +56,9 @@ def test_fused_and_named_blocks_lead_alike(mass_error):
     scenario, plan, maps = problem(FUSED)
     scenario = replace(scenario, deployment=Deployment(control_rate=200.0, mass_error=mass_error))
     fused = simulate_fused(scenario, plan, maps)
-    (used,) = check_budget_used(Rows(fused, plan))
+    used, fast = check_budget_used(Rows(fused, plan))
     assert fused.reached
-    assert used.tightest < 0.8
+    assert max(used.tightest, fast.tightest) < 0.8
     if mass_error > 0.0:
         named = simulate(scenario, plan, maps)
         assert len(named.times) == len(fused.times)
@@ -69,9 +70,9 @@ def test_a_held_team_keeps_its_tube():
     scenario, plan, maps = problem(FUSED)
     scenario = replace(scenario, control=Control(hold=Hold(at=(0.4,), duration=1.0)))
     log = simulate(scenario, plan, maps)
-    (used,) = check_budget_used(Rows(log, plan))
+    used, fast = check_budget_used(Rows(log, plan))
     assert log.reached
-    assert used.tightest < 0.8
+    assert max(used.tightest, fast.tightest) < 0.8
     still = (log.times > 1.3) & (log.held > 0.0)
     assert np.ptp(log.governor_position[still], axis=0).max() < 1e-3
 
@@ -81,7 +82,7 @@ def test_a_log_that_departs_from_the_tube_is_refused():
     row = len(log.times) // 2
     moved = log.object_pose.copy()
     moved[row, 0] += 2.0 * plan.tube.radius
-    with pytest.raises(RefusalError, match="from its nominal position"):
+    with pytest.raises(RefusalError, match="from its nominal motion"):
         check_budget_used(Rows(replace(log, object_pose=moved), plan))
     led = log.governor_position.copy()
     led[row:] += 0.01

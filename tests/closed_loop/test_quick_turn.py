@@ -66,15 +66,14 @@ def test_axes_keep_the_stated_distances_in_a_quick_turn(mass_error):
     plan, log = turned(mass_error)
     assert (log.reached, log.violation) == (True, "")
     assert np.abs(log.object_twist[:, 2]).max() > 1.2
-    spare = check_budget_used(Rows(log, plan))[1].tightest
-    assert spare == pytest.approx(spared(plan, log).min())
-    assert spare > 0.0
+    assert max(check.tightest for check in check_budget_used(Rows(log, plan))) < 1.0
+    assert spared(plan, log).min() > 0.0
 
 
 def test_without_rate_terms_axes_come_nearer_to_their_bounds_than_stated():
     plan, log = turned(-0.2, counted=False)
     assert spared(plan, log).min() < -0.01
-    with pytest.raises(RefusalError, match="nearer to a bound than stated"):
+    with pytest.raises(RefusalError, match="nearer to a bound of its funnel than stated"):
         check_budget_used(Rows(log, plan))
 
 

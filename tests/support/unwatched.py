@@ -1,4 +1,4 @@
-"""Runs of the compiled loop in which nothing of the world ends the run: what a team does when nobody watches."""
+"""Runs of the compiled loop that nothing of the world ends: what a team does when nobody watches."""
 
 from __future__ import annotations
 

@@ -13,6 +13,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import NDArray
 
+from coop_drake.answers.plan import Plan
 from coop_drake.tree.pose import FloatArray
 
 PIECES = 16
@@ -75,6 +76,22 @@ class Axes:
         ramped = self.mu > 0.0
         value = np.where(ramped, self.k1 * (1.0 - gone - self.mu * time * gone), self.k1)
         return value, np.where(ramped, self.k1 * self.mu**2 * time * gone, 0.0)
+
+
+def axes_of(plan: Plan, k: int) -> Axes:
+    """Return funnels and gains of all axes in a transition."""
+    cell, transition = plan.cells[k], plan.transitions[k]
+    gains, same = transition.gains, np.ones_like(cell.lower)
+    goal = np.array([transition.goal_lower, transition.goal_upper])
+    single = (gains.position_gain, gains.rate_gain, gains.ramp_rate, gains.saturation)
+    singles = (value * same for value in (*single, gains.hand_over_time))
+    return Axes(np.array([cell.lower, cell.upper]), goal, gains.decay_rate, gains.log_gain, *singles)
+
+
+def law(axes: Axes, time: float, x: FloatArray, v: FloatArray) -> FloatArray:
+    """Return the acceleration L at (x, v), shape (b,), a time since the transition began [s]."""
+    acceleration: FloatArray = _law(axes, time, x[None], v)[0][0]
+    return acceleration
 
 
 def fit(

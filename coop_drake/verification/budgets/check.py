@@ -19,7 +19,7 @@ from coop_drake.errors import RefusalError
 from coop_drake.tree import ComponentTree
 from coop_drake.tree.pose import FloatArray, IntArray
 from coop_drake.verification.budgets.axis_departure import Loop, departures, loop_of, resting
-from coop_drake.verification.budgets.axis_law import Axes
+from coop_drake.verification.budgets.axis_law import Axes, axes_of
 from coop_drake.verification.budgets.entering import entering, first_rest
 from coop_drake.verification.budgets.rate_room import check_rate_room
 from coop_drake.verification.budgets.rate_terms import couplings
@@ -156,19 +156,10 @@ def _require(stated: FloatArray, found: FloatArray, least: bool, where: str) -> 
         )  # fmt: skip
 
 
-def _axes(plan: Plan, k: int) -> Axes:
-    cell, transition = plan.cells[k], plan.transitions[k]
-    gains, same = transition.gains, np.ones_like(cell.lower)
-    goal = np.array([transition.goal_lower, transition.goal_upper])
-    single = (gains.position_gain, gains.rate_gain, gains.ramp_rate, gains.saturation)
-    singles = (value * same for value in (*single, gains.hand_over_time))
-    return Axes(np.array([cell.lower, cell.upper]), goal, gains.decay_rate, gains.log_gain, *singles)
-
-
 def _check_motion(plan: Plan, k: int, stated: Tolerance, where: str) -> tuple[_Motion, FloatArray]:
     """Check one transition of the nominal motions; return in which states the next one can begin, too."""
     assert plan.budget is not None  # checked by the caller
-    budget, axes, rest = plan.budget, _axes(plan, k), plan.transitions[k].gains.rest
+    budget, axes, rest = plan.budget, axes_of(plan, k), plan.transitions[k].gains.rest
     members, middle, reach = _parts(stated)
     T, motions = budget.period, Nominal(axes[members], budget.period, budget.lag)
     ended = np.maximum(5.0 / axes.decay, np.where(axes.mu > 0.0, RAMPED / np.maximum(axes.mu, 1e-9), 0.0))

@@ -1,19 +1,24 @@
-"""Check by the log of a run that the object and the axes used no more than their plan's budget allows.
+"""Check by the log of a run that nothing departed from its nominal motion by more than its plan states.
 
-The nominal motion is not in the log. It follows from p_G alone, which is at rest between samples: from the
-start at rest it is carried from sample to sample as an oscillator about p_G.
+The nominal motions are not in the log. That of the position follows from p_G alone, which is at rest between
+samples: from the start at rest it is carried from sample to sample as an oscillator about p_G. Those of the
+axes follow from the plan and from the times at which cells were entered: they are commanded by the law of the
+axes, which acts on themselves. In a run with holds they have a clock that stands still, and are not computed.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from math import nan
+from math import inf, nan
+from typing import NamedTuple
 
 import numpy as np
 import shapely
 
+from coop_drake.answers.plan import Plan
 from coop_drake.tree.pose import FloatArray, IntArray
+from coop_drake.verification.budgets.axis_law import axes_of, law
 from coop_drake.verification.budgets.position_loop import oscillator
+from coop_drake.verification.budgets.tubes import Nominal
 from coop_drake.verification.checks import Check
 from coop_drake.verification.runs.rows import Rows
 
@@ -21,7 +26,50 @@ SAME_TIME = 1e-9
 """Times that differ by less are those of one instant [s]."""
 
 ROUNDING = 1e-9
-"""Distances that are computed twice may differ by so much [m]."""
+"""Distances that are computed twice may differ by so much [m, rad, and per second]."""
+
+
+class Departure(NamedTuple):
+    """One kind of departure in a run, and what the plan states about it.
+
+    Attributes:
+        statement: What is stated, in words.
+        array: The log's array that it is about.
+        what: What departs, a name for each column.
+        finding: What is wrong where more is found than stated, with a place for both numbers.
+        found: In some rows, shape (R, columns) [m, rad, and per second].
+        stated: The largest one that is allowed there, of the same shape.
+        rows: Which rows these are, shape (R,).
+    """
+
+    statement: str
+    array: str
+    what: tuple[str, ...]
+    finding: str
+    found: FloatArray
+    stated: FloatArray
+    rows: IntArray
+
+    @property
+    def shares(self) -> FloatArray:
+        """The found ones over the stated ones [-]."""
+        with np.errstate(divide="ignore", invalid="ignore"):
+            shares: FloatArray = np.where(self.found > 0.0, self.found / self.stated, 0.0)
+        return shares
+
+
+class Largest(NamedTuple):
+    """Where a run departed the most of all, as a share of what the plan states.
+
+    Attributes:
+        share: The share [-].
+        what: What departed.
+        time: When [s].
+    """
+
+    share: float
+    what: str
+    time: float
 
 
 def check_budget_used(rows: Rows) -> list[Check]:
@@ -29,30 +77,131 @@ def check_budget_used(rows: Rows) -> list[Check]:
     plan = rows.plan
     if plan.budget is None or plan.tube is None:
         return []
-    checks = [_check_tube(rows, plan.tube.radius, plan.tube.speed)]
-    if plan.budget.axes:
-        checks.append(_check_distances(rows))
+    _check_nominal(rows, plan.tube.speed)
+    checks = []
+    for one in stated_departures(rows):
+        held, values = np.ones((len(rows.log.times), one.found.shape[1]), dtype=np.bool_), []
+        for array in (one.found, one.stated):
+            values.append(np.zeros(held.shape))
+            values[-1][one.rows] = array
+        held[one.rows] = one.found <= one.stated + ROUNDING
+        rows.require(held, one.array, one.finding, *values)
+        checks.append(Check(one.statement, one.found.size, float(one.shares.max()), "of it used"))
     return checks
+
+
+def largest_departure(rows: Rows, until: float = inf) -> Largest | None:
+    """Return the largest departure of a run until some time [s]; None for a plan without a budget.
+
+    Raises:
+        RefusalError: The log does not have all samples that the nominal motion depends on.
+    """
+    found = []
+    for one in stated_departures(rows):
+        shares = one.shares[rows.log.times[one.rows] < until]
+        if not shares.size:
+            continue
+        row, column = np.unravel_index(int(np.argmax(shares)), shares.shape)
+        share, time = float(shares[row, column]), float(rows.log.times[one.rows[row]])
+        found.append(Largest(share, one.what[int(column)], time))
+    return max(found, default=None)
 
 
 def budget_share(rows: Rows) -> float:
     """Return the largest share that a run used of what its plan's budget states [-]; NaN without a budget.
 
-    That of the position is its distance from the nominal motion over the tube's radius. That of an axis is
-    the least distance to its funnel's bounds that the budget states over the one that the axis kept.
+    Raises:
+        RefusalError: The log does not have all samples that the nominal motion depends on.
+    """
+    largest = largest_departure(rows)
+    return nan if largest is None else largest.share
+
+
+def stated_departures(rows: Rows) -> list[Departure]:
+    """Return all departures about which a plan with a budget states something.
+
+    An axis that comes nearer to a bound of its funnel than stated departs by the stated distance where it
+    should keep it: the share is the stated distance over the kept one.
 
     Raises:
         RefusalError: The log does not have all samples that the nominal motion depends on.
     """
-    plan = rows.plan
+    plan, log = rows.plan, rows.log
     if plan.budget is None or plan.tube is None:
-        return nan
-    share = float(_off_nominal(rows, *_samples(rows))[1].max() / plan.tube.radius)
-    if plan.budget.axes:
-        for _, stated, kept in _distances(rows):
-            with np.errstate(divide="ignore"):
-                share = max(share, float(np.max(stated / np.maximum(kept, 0.0))))
-    return share
+        return []
+    every, names = np.arange(len(log.times)), ("the object's angle", *log.joint_names)
+    sample, late, first = _samples(rows)
+    nominal = _nominal(rows, log.governor_position[first], first, sample, late)
+    z, rates = log.object_pose[:, :2], log.object_twist[:, :2]
+    off = [np.hypot(*(seen - led).T)[:, None] for seen, led in zip((z, rates), nominal, strict=True)]
+    found = [
+        Departure(statement, array, (what,), finding, values, np.full(values.shape, stated), every)
+        for statement, array, what, finding, values, stated in (
+            (
+                "the object stayed in the tube of its budget",
+                "object_pose",
+                "the object's position",
+                _FAR.format("m"),
+                off[0],
+                plan.tube.radius,
+            ),
+            (
+                "its velocity stayed as near to the nominal one",
+                "object_twist",
+                "the object's velocity",
+                _FAR.format("m/s"),
+                off[1],
+                plan.tube.rate,
+            ),
+        )
+    ]
+    if not plan.budget.axes:
+        return found
+    kept = np.minimum(rows.z[:, 2:] - log.funnel_lower, log.funnel_upper - rows.z[:, 2:])
+    least = _of_cells(plan, log.cell_index, "distance")
+    near = np.where(kept > 0.0, kept, 0.0)
+    nearness = (
+        "comes nearer to a bound of its funnel than stated: the stated distance is {:.6g} times its own"
+    )
+    with np.errstate(divide="ignore"):
+        statement, shares = "axes kept the distances that the budget states", least / near
+        found.append(
+            Departure(statement, "angle, joints", names, nearness, shares, np.ones(least.shape), every)
+        )
+    if not log.held.any():
+        axes = _nominal_axes(rows, first)
+        of_rates = tuple(f"the rate of {name}" for name in names)
+        for statement, name, array, seen, led, what in (
+            (
+                "axes stayed in the tubes of their budget",
+                "departure",
+                "angle, joints",
+                rows.z,
+                axes[:, 0],
+                names,
+            ),
+            (
+                "their rates stayed as near to the nominal ones",
+                "rate_departure",
+                "joint_rates",
+                rows.rates,
+                axes[:, 1],
+                of_rates,
+            ),
+        ):
+            stated = _of_cells(plan, log.cell_index[first], name)
+            away = np.abs(seen[first, 2:] - led)
+            found.append(Departure(statement, array, what, _FAR.format("rad or m"), away, stated, first))
+    return found
+
+
+_FAR = "is {{:.6g}} {} from its nominal motion; the plan's budget states {{:.6g}}"
+
+
+def _of_cells(plan: Plan, cells: IntArray, name: str) -> FloatArray:
+    """Return a field of the tolerance of every cell given, shape (R, 1 + n)."""
+    fields = [getattr(transition.tolerance, name) for transition in plan.transitions]
+    return np.asarray(fields)[cells]
 
 
 def _samples(rows: Rows) -> tuple[IntArray, FloatArray, IntArray]:
@@ -66,16 +215,8 @@ def _samples(rows: Rows) -> tuple[IntArray, FloatArray, IntArray]:
     return sample, late, first
 
 
-def _off_nominal(
-    rows: Rows, sample: IntArray, late: FloatArray, first: IntArray
-) -> tuple[FloatArray, FloatArray]:
-    """Return the nominal position in every row, (T, 2), and the object's distance from it, (T,) [m]."""
-    nominal = _nominal(rows, rows.log.governor_position[first], first, sample, late)
-    return nominal, np.hypot(*(rows.log.object_pose[:, :2] - nominal).T)
-
-
-def _check_tube(rows: Rows, radius: float, speed: float) -> Check:
-    """Check p_G at every sample, and the object's distance from its nominal motion in every row."""
+def _check_nominal(rows: Rows, speed: float) -> None:
+    """Check p_G at every sample, and that it led the nominal motion through its regions."""
     log, plan = rows.log, rows.plan
     assert plan.budget is not None  # checked by the caller
     sample, late, first = _samples(rows)
@@ -87,21 +228,14 @@ def _check_tube(rows: Rows, radius: float, speed: float) -> Check:
     moved = np.zeros(len(log.times))
     moved[first] = steps
     rows.require(within, "governor_position", text, moved)
-    nominal, off = _off_nominal(rows, sample, late, first)
+    nominal = _nominal(rows, p_G, first, sample, late)[0]
     for k in range(len(plan.cells)):
         inside = (log.cell_index != k) | shapely.contains_xy(plan.governed(k), nominal[:, 0], nominal[:, 1])
         rows.require(inside, "governor_position", f"has led the nominal motion out of the region of cell {k}")
-    rows.require(off <= radius + ROUNDING, "object_pose", "is {:.6g} m from its nominal position", off)
-    return Check(
-        "the object stayed in the tube of its budget",
-        len(log.times),
-        float(off.max() / radius),
-        "of its radius used",
-    )
 
 
 def _nominal(rows: Rows, p_G: FloatArray, first: IntArray, sample: IntArray, late: FloatArray) -> FloatArray:
-    """Return the nominal position in every row, shape (T, 2) [m]."""
+    """Return the nominal position and velocity in every row, shape (2, T, 2) [m, m/s]."""
     plan, gains = rows.plan, rows.plan.transitions[0].gains
     assert plan.budget is not None  # checked by the caller
     flow = oscillator(gains.stiffness, gains.damping, plan.budget.period)
@@ -111,31 +245,33 @@ def _nominal(rows: Rows, p_G: FloatArray, first: IntArray, sample: IntArray, lat
         states[i] = state
         state = flow @ state
         state[0] -= p_G[min(i + 1, len(first) - 1)] - p_G[i]
-    positions = np.empty((len(sample), 2))
+    nominal = np.empty((2, len(sample), 2))
     at = np.searchsorted(sample[first], sample)
     for row, (i, time) in enumerate(zip(at, late, strict=True)):
         carried = (
             states[i] if time <= SAME_TIME else oscillator(gains.stiffness, gains.damping, time) @ states[i]
         )
-        positions[row] = p_G[i] + carried[0]
-    return positions
+        nominal[:, row] = p_G[i] + carried[0], carried[1]
+    return nominal
 
 
-def _distances(rows: Rows) -> Iterator[tuple[IntArray, FloatArray, FloatArray]]:
-    """Yield of every cell with a budget its rows, the stated distances, (1 + n,), and those kept there."""
-    log, axes = rows.log, rows.z[:, 2:]
-    kept = np.minimum(axes - log.funnel_lower, log.funnel_upper - axes)
-    for k, transition in enumerate(rows.plan.transitions):
-        inside = np.flatnonzero(log.cell_index == k)
-        if transition.tolerance is not None and len(inside):
-            yield inside, transition.tolerance.distance, kept[inside]
+def _nominal_axes(rows: Rows, first: IntArray) -> FloatArray:
+    """Return nominal axes and their rates at all samples, shape (samples, 2, 1 + n) [rad or m, and per s].
 
-
-def _check_distances(rows: Rows) -> Check:
-    """Check that every axis kept the distance to its funnel's bounds that the budget states."""
-    spare = np.full((len(rows.log.times), rows.z.shape[1] - 2), np.inf)
-    for inside, stated, kept in _distances(rows):
-        spare[inside] = kept - stated
-    rows.require(spare >= -ROUNDING, "angle, joints", "is {:.6g} nearer to a bound than stated", -spare)
-    least = float(spare.min())
-    return Check("axes kept the distances that the budget states", spare.size, least, "rad or m to spare")
+    Args:
+        rows: A run without holds.
+        first: The samples' first rows.
+    """
+    plan, log, count = rows.plan, rows.log, rows.z.shape[1] - 2
+    assert plan.budget is not None  # checked by the caller
+    axes, nothing = [axes_of(plan, k) for k in range(len(plan.cells))], np.zeros(count)
+    rests = [plan.start[2:], *(0.5 * (one.goal_lower + one.goal_upper) for one in plan.transitions[:-1])]
+    jumps = [-law(own, 0.0, rest, nothing) for own, rest in zip(axes, rests, strict=True)]
+    matrix, enters = Nominal(axes[0], plan.budget.period, plan.budget.lag).carry
+    state, states = np.array([plan.start[2:], nothing, nothing]), np.empty((len(first), 2, count))
+    for i, row in enumerate(first):
+        states[i] = state[:2]
+        cell, time = int(log.cell_index[row]), float(log.times[row] - log.transition_start[row])
+        command = law(axes[cell], time, state[0], state[1]) + axes[cell].left(time) * jumps[cell]
+        state = matrix @ state + enters[:, None] * command
+    return states

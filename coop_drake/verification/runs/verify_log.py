@@ -13,7 +13,7 @@ the array, the index and the time:
 7. Bases, wrenches and efforts go with the motion: ``grasps``, ``mechanics``.
 8. Bases and joints kept their limits: ``speeds.check_run_speeds``, ``speeds.check_run_efforts``.
 9. Nothing touched: ``clearances.check_clearances``.
-10. Where the plan has a budget, no more of it was used than there is: ``tube.check_budget_used``.
+10. Nothing departed by more than a budget of the plan states: ``tube.check_budget_used``.
 
 Of a run in which all drives braked, statements 5, 6 and 10 are left aside: they are about the plan's laws.
 """
@@ -86,12 +86,15 @@ def verify_log(
     checks += check_clearances(rows, between, problem, progress)
     checks += [] if braked else check_budget_used(rows)
     stayed = "" if braked else ", and the team stayed in cells and funnels"
+    aside = _left_aside(setup, braked=braked)
+    if log.held.any() and plan.budget is not None and plan.budget.axes and not braked:
+        aside.append("how far the axes departed from their nominal motions, for the team was held")
     return Verified(
         "arrived",
         f"run of {log.times[-1]:.2f} s in {len(log.times)} rows",
         tuple(checks),
         f"in this run nothing touched{stayed}, between the rows, too",
-        "; ".join([*_left_aside(setup, braked=braked), "other runs; that the robots are as in their models"]),
+        "; ".join([*aside, "other runs; that the robots are as in their models"]),
     )
 
 
