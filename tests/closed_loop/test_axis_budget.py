@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from coop_drake.answers.budget import Budget
+from coop_drake.cli.summary import beyond_budget, budget_facts
 from coop_drake.errors import RefusalError
 from coop_drake.laws import ScheduledGains
 from coop_drake.planning.planner import plan as make
@@ -94,6 +95,29 @@ def test_cells_are_left_at_rest_and_one_that_is_left_unready_or_earlier_is_refus
     cells[left[0] - 20 : left[0] + 1] += 1
     with pytest.raises(RefusalError, match=r"transition_start\[\d+\]"):
         check_handovers(Rows(replace(log, cell_index=cells), plan), exact=False)
+
+
+def test_a_stated_departure_that_is_exceeded_in_the_world_is_said_and_its_log_refused():
+    _, plan, log = run()
+    within = budget_facts(plan, log)
+    assert 0.01 < within["budget_used"] < 1.0
+    assert beyond_budget(within) == ""
+    row = len(log.times) // 2
+    stated = plan.transitions[log.cell_index[row]].tolerance.rate_departure
+    for array, column, away, what in (
+        ("object_pose", 1, plan.tube.radius, "the object's position"),
+        ("object_twist", 0, plan.tube.rate, "the object's velocity"),
+        ("joint_rates", 1, stated[2], "the rate of robot_1::elbow"),
+    ):
+        moved = getattr(log, array).copy()
+        moved[row, column] += 1.9 * away
+        departed = replace(log, **{array: moved})
+        said = beyond_budget(budget_facts(plan, departed))
+        assert said.startswith((f"{what} departed by 1.", f"{what} departed by 2."))
+        assert said.endswith(f"times what the plan's budget states, at t = {log.times[row]:.6g} s")
+        assert beyond_budget(budget_facts(plan, departed, until=log.times[row])) == ""
+        with pytest.raises(RefusalError, match="from its nominal motion; the plan's budget states"):
+            check_budget_used(Rows(departed, plan))
 
 
 def test_a_log_with_an_axis_nearer_to_a_bound_than_stated_is_refused():
