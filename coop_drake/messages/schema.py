@@ -87,8 +87,9 @@ class Sample(NamedTuple):
         stopped: Whether the line of the emergency stop is open, so that the drives of all robots brake.
         team_messages: In lock-step, the robot computes once it has so many messages of the supervisor in
             their session.
-        object_pose: Pose (x, y, angle) of the object's frame L in W, angle unwrapped.
-        robot_state: The robot's own (z_k, z_k'), z_k = (x, y, yaw of Bk, q_k), in W.
+        object_pose: Pose (x, y, angle) of the object's frame L in W, the angle in any turn.
+        robot_state: The robot's own (z_k, z_k'), z_k = (x, y, yaw of Bk, q_k), in W, joints without limits in
+            any turn.
     """
 
     number: Number

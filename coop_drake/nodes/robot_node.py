@@ -25,8 +25,10 @@ from coop_drake.nodes.states import (
     STANDS,
 )
 from coop_drake.nodes.stillness import Stillness
+from coop_drake.plant.chain import is_circle
 from coop_drake.scenario import Deployment
 from coop_drake.systems import axis_laws, robot_record
+from coop_drake.tree.circles import whole_turns
 from coop_drake.tree.pose import FloatArray
 
 Said = list[Ready | HoldRequest | AtRest]
@@ -38,6 +40,10 @@ class RobotNode:
 
     While its drives brake, it stands: it sets its states to those of a robot that begins the current cell at
     rest where it is, and says so where it may. On the supervisor's order it begins, as all others do.
+
+    Sensors may show the object's angle and joints without limits in any turn: each value counts in the turn
+    in which it is nearest to the one before, at first to the plan's start, and to the middle of the current
+    cell where the process was started again.
 
     Args:
         knowledge: What the robot knows before the run.
@@ -71,6 +77,10 @@ class RobotNode:
         self._still = Stillness(self.period)
         self._timeout = self._samples_of(REPORT_TIMEOUT)
         self._waits, self._number = (np.zeros(2), 0), 0
+        endless = [3 + i for i, joint in enumerate(knowledge.robot.joints) if is_circle(joint)]
+        self._circles = [self._state_size + 2, *endless]
+        self._middles = [0.5 * (cell.lower + cell.upper)[axes] for cell in knowledge.plan.cells]
+        self._near = self._of_circles(knowledge.plan.start[2:][axes])
         start = np.array(knowledge.plan.start[:3])
         self._sampled.at(0.0, self._inputs(np.concatenate([np.zeros(self._state_size), start])))
         self._deployed.prepare(self._sampled.context, start[:2])
@@ -79,6 +89,16 @@ class RobotNode:
         own = {"robot_state": measured[: self._state_size], "object_pose": measured[self._state_size :]}
         heard = {"current_cell": self._cell}
         return own | heard | ({"hold_message": self._hold_message} if self._held else {})
+
+    def _of_circles(self, values: FloatArray) -> FloatArray:
+        """Return which of the values of (theta, q...) are those of circles."""
+        return values[[0, *(place - 2 for place in self._circles[1:])]]
+
+    def _unwrapped(self, measured: FloatArray) -> FloatArray:
+        """Return what is measured with circles in the turn in which they are nearest to those before."""
+        turned = measured.copy()
+        turned[self._circles] += whole_turns(measured[self._circles], self._near)
+        return turned
 
     def forget(self) -> None:
         """Know no current cell: the process was started again during a run."""
@@ -95,7 +115,7 @@ class RobotNode:
             time: The instant [s].
             measured: Its own state, then the object's pose, as it measures them.
         """
-        self._sampled.at(time, self._inputs(measured))
+        self._sampled.at(time, self._inputs(self._unwrapped(measured)))
         return row_of(self._sampled, self._controller, self._logged)
 
     def step(
@@ -110,6 +130,8 @@ class RobotNode:
             stopped: Whether the drives brake.
         """
         self._number = period_of(time, self.period) if sample is None else sample
+        measured = self._unwrapped(measured)
+        self._near = measured[self._circles] if np.isfinite(measured).all() else self._near
         if not self._follows(time, measured, stopped=stopped):
             return np.zeros(3 + self._joints), self._stand(time, measured) if self.place.known else []
         self._sampled.at(time, self._inputs(measured))
@@ -139,7 +161,7 @@ class RobotNode:
 
     def _enter(self, cell: int, sample: int) -> None:
         if self.state == ASKS:
-            self.state = STANDS
+            self.state, self._near = STANDS, self._of_circles(self._middles[cell])
         self.place, self._cell = Place(True, cell, sample), np.array([cell, sample * self.period])
 
     def _follows(self, time: float, measured: FloatArray, *, stopped: bool) -> bool:
@@ -151,7 +173,9 @@ class RobotNode:
             self._order = None
             if number == order.sample:
                 self._enter(order.cell, order.sample)
-                self._begin(time, measured, np.array(order.object_pose))
+                pose = np.array(order.object_pose)
+                pose[2] += whole_turns(pose[2:], self._near[:1])[0]
+                self._begin(time, measured, pose)
                 until = order.sample + whole_periods(POSITION_WAITS, self.period)
                 self._waits = np.array(order.object_pose[:2]), until
                 return True

@@ -72,6 +72,11 @@ def limits_of(joint: Joint) -> tuple[float, float]:
     return (lower if lower > -_ENDLESS else -inf, upper if upper < _ENDLESS else inf)
 
 
+def is_circle(joint: Joint) -> bool:
+    """Whether a joint is a circle: revolute, without limits."""
+    return bool(joint.type_name() == "revolute" and limits_of(joint) == (-inf, inf))
+
+
 def _check_kind(
     refuse: Callable[[str, str], ScenarioError], robot: str, plant: MultibodyPlant, joint: Joint
 ) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from math import inf, isfinite
+from math import isfinite
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +14,7 @@ from pydrake.multibody.tree import Joint
 from pydrake.systems.framework import Context
 
 from coop_drake.errors import ScenarioError
-from coop_drake.plant.chain import limits_of
+from coop_drake.plant.chain import is_circle, limits_of
 from coop_drake.plant.parsing import joints_of
 from coop_drake.plant.planarity import TILT, axis_in_world, is_upright
 
@@ -88,7 +88,7 @@ def _judged(joint: Joint, context: Context, fixed: bool) -> SurveyedJoint:
     axis = axis_in_world(joint, context)
     planar = is_upright(axis) if kind == "revolute" else abs(float(axis[2])) <= TILT
     lower, upper = limits_of(joint)
-    circle = kind == "revolute" and (lower, upper) == (-inf, inf)
+    circle = is_circle(joint)
     endless = not (circle or (isfinite(lower) and isfinite(upper)))
     return SurveyedJoint(
         joint.name(),

@@ -50,8 +50,8 @@ class TeamSensor(Block):
                                                  z_k = (x, y, yaw of Bk, q_k) [m, rad]
     ======= ================ =================== =================================================== =====
 
-    No state. The object's angle is unwrapped; yaws are in (-pi, pi]. All sensors are one block, because one
-    call costs less than many; a demultiplexer gives each robot its own part.
+    No state. The object's angle and joints are unwrapped; yaws are in (-pi, pi]. All sensors are one block,
+    because one call costs less than many; a demultiplexer gives each robot its own part.
 
     Args:
         team: The team whose plant gives the state.

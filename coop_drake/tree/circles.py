@@ -15,6 +15,11 @@ def nearest_turn(angle: float) -> float:
     return (angle + pi) % (2.0 * pi) - pi
 
 
+def whole_turns(values: FloatArray, near: FloatArray) -> FloatArray:
+    """Whole turns that bring angles nearest to others, exactly zero where they are; any shape [rad]."""
+    return 2.0 * pi * np.rint((near - values) / (2.0 * pi))
+
+
 def turns_to(values: Sequence[float], near: Sequence[float], circular: Sequence[bool]) -> FloatArray:
     """Whole turns that bring values of axes nearest to others; zero on axes that are no circles.
 

@@ -1,0 +1,84 @@
+"""Turrets without limits carry an object through pi: planned, verified, run; sensors may show any turn."""
+
+import json
+from math import pi
+
+import numpy as np
+import pytest
+
+from coop_drake.answers.plan import Found
+from coop_drake.chain import plan
+from coop_drake.diagram import build_station
+from coop_drake.diagram.knowledge import robot_knowledge
+from coop_drake.messages import Place, Switch
+from coop_drake.nodes import RobotNode
+from coop_drake.nodes.one_process import DirectExchange, simulate_apart
+from coop_drake.scenario import load_scenario
+from coop_drake.simulation import build_maps, simulate
+from tests.support.cli import invoke
+from tests.support.turret import write_turret
+
+SAMPLED = "deployment: {control_rate: 100}"
+BUDGET = "deployment: {preset: mobile_base, budget: all, actuators: {base_force: 1000}}"
+
+
+class Wrapping(DirectExchange):
+    """Sensors of the object's angle and of joints show them in (-pi, pi]."""
+
+    def step(self, time, measured):
+        return super().step(time, [self._wrapped(own) for own in measured])
+
+    def look(self, time, measured):
+        return super().look(time, [self._wrapped(own) for own in measured])
+
+    @staticmethod
+    def _wrapped(own):
+        """What a robot with one joint measures: x, y, yaw, q, their rates, and the object's pose."""
+        shown = own.copy()
+        shown[[3, 10]] = np.arctan2(np.sin(own[[3, 10]]), np.cos(own[[3, 10]]))
+        return shown
+
+
+@pytest.fixture(scope="module")
+def sampled(tmp_path_factory):
+    """Scenario of a sampled team, its plan and maps; the joint begins four turns from where it ends."""
+    scenario = load_scenario(
+        write_turret(tmp_path_factory.mktemp("turret"), 3.0 + 8.0 * pi, -3.1, more=SAMPLED)
+    )
+    answer = plan(scenario)
+    assert isinstance(answer, Found)
+    return scenario, answer.plan, build_maps(answer.plan)
+
+
+@pytest.mark.parametrize("more", ["", BUDGET], ids=["ideal", "under a budget"])
+def test_a_turret_turns_through_pi_and_arrives(tmp_path, more):
+    path = write_turret(tmp_path, 3.0, 3.3, more=more)
+    ran = invoke("run", path, "--out", tmp_path, "--no-figures", "--json")
+    assert ran.exit_code == 0
+    assert json.loads(ran.stdout)["outcome"] == "arrived"
+    assert invoke("verify", tmp_path / "plan.json", path).exit_code == 0
+    assert invoke("verify", tmp_path / "log.npz", path).exit_code == 0
+
+
+def test_robots_unwrap_what_their_sensors_show(sampled):
+    scenario, made, maps = sampled
+    usual = simulate(scenario, made, maps)
+    wrapped = simulate_apart(scenario, made, maps, exchange=Wrapping())
+    assert usual.reached
+    assert wrapped.reached
+    np.testing.assert_allclose(wrapped.joints[-1], usual.joints[-1], atol=1e-6)
+    assert wrapped.joints[-1, 0] == pytest.approx(10.0 * pi - 3.1, abs=0.02)
+
+
+def test_a_robot_that_is_started_again_counts_turns_from_its_cell(sampled):
+    scenario, made, maps = sampled
+    team = build_station(scenario).team
+    node = RobotNode(robot_knowledge(scenario, made, maps, team)[0], scenario.deployment, 0, "robot_0")
+    node.forget()
+    node.hear([Switch(0, 0)])
+    at_start = np.array([*made.start[:3], 3.0, *[0.0] * 4, *made.start[:3]])
+    shown = node.look(0.0, at_start)
+    assert np.array_equal(shown, node.look(0.0, np.where(np.arange(11) == 3, made.start[3], at_start)))
+    node.step(0.0, at_start, stopped=True)
+    assert node.place == Place(True, 0, 0)
+    node.release()
