@@ -29,7 +29,8 @@ class Cell:
     """One cell of the plan: positions times intervals, all of it free.
 
     Attributes:
-        lower: Lower ends of (theta, q...), theta unwrapped along the plan, shape (1 + n,) [rad, m].
+        lower: Lower ends of (theta, q...), theta and joints without limits unwrapped along the plan, shape
+            (1 + n,) [rad, m].
         upper: Upper ends, shape (1 + n,).
         tidied: Q_i, positions that are safe for every angle in the intervals, simply connected, fit for a map
             and for the governor [m].
@@ -85,7 +86,7 @@ class Plan:
         joint_names: Names of q's entries, length n.
         start: z = (x, y, theta, q...), shape (3 + n,).
         goal_pose: (x, y, theta), theta unwrapped along the plan, shape (3,).
-        goal_joints: Goal of each joint, None where free.
+        goal_joints: Goal of each joint, None where free; of joints without limits unwrapped along the plan.
         cells: From the start's cell to the goal's.
         transitions: One for each cell, in the same order.
         budget: Departures from the ideal team under which the object provably stays in its cells, and every

@@ -63,7 +63,8 @@ class PlanningProblem:
 
     A joint that starts or is to end nearer to a limit than ``LIMIT_ROOM``, or that cannot move, may be
     planned up to so much beyond that limit, everywhere on the way: plans and proofs are about these wider
-    limits. A question whose start or goal is itself beyond a limit keeps the limits as they are.
+    limits. A question whose start or goal is itself beyond a limit keeps the limits as they are. A joint
+    without limits is a circle.
 
     The goal is a closed set: positions in the disc of the position's tolerance, and ``goal_box``.
 
@@ -72,7 +73,8 @@ class PlanningProblem:
         tree: The team as seen from the object outwards, with that room.
         start: z = (x, y, theta, q...), shape (3 + n,) [m, rad].
         goal_pose: (x, y, theta) of the object, shape (3,); theta is taken modulo 2 pi.
-        goal_joints: Goal value of each joint, None where the joint is free, length n.
+        goal_joints: Goal value of each joint, None where the joint is free, length n; those of joints without
+            limits are taken modulo 2 pi.
         position_tolerance: Final position tolerance [m].
         angle_tolerance: Final angle tolerance [rad].
         joint_tolerance: Final tolerance of joints that have a goal, of all or of each, shape (n,) [rad or m].

@@ -22,7 +22,7 @@ from coop_drake.tree.pose import FloatArray
 def is_free(problem: PlanningProblem, path: FloatArray) -> tuple[bool, int]:
     """Try to prove a path free at margin zero, by covering it with free boxes.
 
-    The path, theta unwrapped, has shape (m, 3 + n) [m, rad].
+    The path, circular axes unwrapped, has shape (m, 3 + n) [m, rad].
 
     Returns:
         Whether the path is proved free (a failure proves nothing), and how many boxes were tried.
@@ -43,7 +43,7 @@ def widest_path(problem: PlanningProblem, channel: Channel) -> FloatArray:
     """A path through a channel that leaves each box where its overlap with the next one is widest.
 
     Returns:
-        Configurations from start to goal, theta unwrapped, shape (m, 3 + n) [m, rad].
+        Configurations from start to goal, circular axes unwrapped, shape (m, 3 + n) [m, rad].
     """
     targets = []
     for one, other in pairwise(channel.boxes):

@@ -91,7 +91,8 @@ class Start:
 
     Attributes:
         object: The object's pose.
-        joints: For each robot the positions of its joints, from the base to the end effector [rad or m].
+        joints: For each robot the positions of its joints, from the base to the end effector [rad or m];
+            those of joints without limits may be in any turn.
     """
 
     object: ObjectPose
@@ -120,7 +121,8 @@ class Goal:
     Attributes:
         object: The object's pose; theta is taken modulo 2 pi.
         joints: For each robot that has a goal of its own the positions of its joints, null for a joint that
-            is free [rad or m]. All joints of other robots are free.
+            is free [rad or m]. All joints of other robots are free. Joints without limits are taken modulo
+            2 pi.
         tolerances: Largest errors with which the goal counts as reached.
     """
 

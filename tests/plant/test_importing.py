@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +19,7 @@ from coop_drake.errors import ScenarioError
 from coop_drake.plant.importing import import_robot
 from coop_drake.plant.joint_survey import survey_joints
 from tests.support.edited_scenario import exchanged, write_edited
+from tests.support.turret import URDF
 
 LINK = """<link name="{name}">
   <inertial><mass value="{mass}"/><inertia ixx="{ixx}" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>
@@ -212,3 +214,38 @@ def test_the_command_never_overwrites_and_refuses_wrong_words(maker, tmp_path):
     assert CliRunner().invoke(app, [*call, "--force"]).exit_code == 0
     assert CliRunner().invoke(app, [*call, "--force", "--fix", "arm"]).exit_code == 2
     assert CliRunner().invoke(app, [*call, "--force", "--fix", "arm=up"]).exit_code == 2
+
+
+@pytest.mark.parametrize("ending", ["urdf", "sdf"])
+@pytest.mark.parametrize(
+    ("kind", "limits", "note"),
+    [
+        ("continuous", True, "limits of continuous joints .*: turret_joint$"),
+        ("revolute", False, "revolute joints without limits are circles, as continuous ones: turret_joint"),
+        ("continuous", False, None),
+        ("revolute", True, None),
+    ],
+)
+def test_a_joint_whose_kind_and_limits_differ_is_named(ending, kind, limits, note, tmp_path):
+    path = tmp_path / f"turret.{ending}"
+    said = 'lower="-6.28" upper="6.28"' if limits else ""
+    text = URDF.format(kind=kind, limits=said)
+    if ending == "sdf":
+        said = "<limit><lower>-6.28</lower><upper>6.28</upper></limit>" if limits else ""
+        text = exchanged(SDF, ('type="revolute"', f'type="{kind}"'), ('"turn"', '"turret_joint"'))
+        text = exchanged(text, ("<limit><lower>-1</lower><upper>1</upper></limit>", said))
+    path.write_text(text)
+    found = [one for one in import_robot(path).notes if "limits" in one]
+    assert len(found) == (note is not None)
+    assert note is None or re.search(note, found[0])
+    (joint,) = survey_joints(path)
+    counted = limits and (ending, kind) != ("sdf", "continuous")
+    assert joint.limits == ("-6.28 to 6.28" if counted else "no limits, a circle")
+    assert joint.verdict == "planar"
+
+
+def test_a_joint_with_one_limit_has_to_be_fixed(tmp_path):
+    path = tmp_path / "turret.urdf"
+    path.write_text(URDF.format(kind="revolute", limits='upper="2"'))
+    (joint,) = survey_joints(path)
+    assert (joint.limits, joint.verdict) == ("-inf to 2", "fix it")

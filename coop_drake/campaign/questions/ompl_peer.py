@@ -177,6 +177,6 @@ def _state(space: ob.CompoundStateSpace, z: FloatArray, scale: FloatArray) -> ob
 
 
 def _unwrapped(path: FloatArray) -> FloatArray:
-    """The path with theta unwrapped, so that neighbours differ by pi at most."""
+    """The path with circular axes unwrapped, so that neighbours differ by pi at most."""
     path[:, 2] = np.unwrap(path[:, 2])
     return path

@@ -96,7 +96,7 @@ class Certifier:
         """Cover a path with boxes, from its first to its last configuration.
 
         Args:
-            path: Configurations with theta unwrapped, the first one free, shape (m, 3 + n).
+            path: Configurations with circular axes unwrapped, the first one free, shape (m, 3 + n).
             progress: Called with the fraction of the path that is covered.
             longest: Whether to take the longest boxes, instead of those with the highest average speed.
             smallest: Whether boxes may be as small as a passage of a millimetre needs; a transport through

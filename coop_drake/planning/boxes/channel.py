@@ -25,7 +25,8 @@ class FreeBox:
     Attributes:
         polygon: Positions p_WL, one connected component of the under-approximation at margin zero [m].
         core: The positions that keep the plan's margin, one connected component; a subset of ``polygon`` [m].
-        lower: Lower ends of (theta, q...), expanded by the overlap, theta unwrapped, shape (1 + n,) [rad, m].
+        lower: Lower ends of (theta, q...), expanded by the overlap, circular axes unwrapped, shape
+            (1 + n,) [rad, m].
         upper: Upper ends, shape (1 + n,).
     """
 
@@ -43,10 +44,10 @@ class Channel:
         boxes: From the box that holds the start to the box that holds the goal.
         margin: The margin rho that the cores keep [m].
         goal_angle: Theta where it ends, unwrapped along the boxes [rad].
-        path: The path that the boxes were laid along, theta unwrapped like theirs, shape (m, 3 + n) [m, rad];
-            None if they were found without a path.
+        path: The path that the boxes were laid along, circular axes unwrapped like theirs, shape (m, 3 + n)
+            [m, rad]; None if they were found without a path.
         ends: Where that path leaves each box, shape (boxes, 2) [m]; None without a path.
-        end: The configuration in which it ends without a path, theta modulo a turn, shape (3 + n,) [m, rad];
+        end: The configuration in which it ends without a path, circles modulo a turn, shape (3 + n,) [m, rad];
             None for the middle of the goal.
     """
 
@@ -80,7 +81,7 @@ class CoveredPath:
     """A path that is covered with boxes proved free; the boxes' polygons are made on request.
 
     Attributes:
-        path: From start to goal, theta unwrapped, shape (m, 3 + n) [m, rad].
+        path: From start to goal, circular axes unwrapped, shape (m, 3 + n) [m, rad].
         margin: The margin rho that the path keeps in every box [m].
         channel: Makes the channel of these boxes; raises a GeometryError if geometry fails.
         another: Finds another path by other samples, for a number (1, 2, ...) that these follow from and the

@@ -26,7 +26,7 @@ def path_through(
         targets: Points at which each box is left, the last one the goal; chosen to be quick if not given.
 
     Returns:
-        Free configurations from start to goal, theta unwrapped, shape (m, 3 + n).
+        Free configurations from start to goal, circular axes unwrapped, shape (m, 3 + n).
     """
     if targets is None:
         targets = choose_targets(channel, problem.start[:2], problem.goal_pose[:2])

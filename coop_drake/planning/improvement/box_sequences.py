@@ -19,7 +19,7 @@ class Waypoints(NamedTuple):
     Attributes:
         boxes: The team.
         grid: The floor.
-        path: Waypoints z, theta unwrapped, shape (n, 3 + joints) [m, rad].
+        path: Waypoints z, circular axes unwrapped, shape (n, 3 + joints) [m, rad].
         places: Where they lie along the path, shape (n,) [m].
         pads: Paddings of a box to choose from, shape (p,) [rad or m].
         goals: Lower and upper ends of the last goal intervals, shape (2, m) [rad, m].

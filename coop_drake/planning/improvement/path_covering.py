@@ -81,7 +81,7 @@ def cover_path(
 
     Args:
         problem: What was asked.
-        path: Free configurations from start to goal, theta unwrapped, shape (m, 3 + n) [m, rad].
+        path: Free configurations from start to goal, circular axes unwrapped, shape (m, 3 + n) [m, rad].
         margin: The margin that the path keeps [m].
         gain_set: Gains, fixed or to be scheduled.
         least_overlap: Least overlap of consecutive boxes in every angle and joint [rad or m].

@@ -60,7 +60,7 @@ def best_candidate(
     Args:
         problem: The question.
         hierarchy: Its subsystems.
-        known: A free path, theta unwrapped, shape (m, 3 + n) [m, rad].
+        known: A free path, circular axes unwrapped, shape (m, 3 + n) [m, rad].
         gap: Smallest distance between bodies of the team [m].
         share: Share of ``CANDIDATES`` that is sampled [-].
     """
@@ -103,7 +103,7 @@ def moved_from_obstacles(
 
     Args:
         problem: The question.
-        path: A free path, theta unwrapped, shape (m, 3 + n) [m, rad].
+        path: A free path, circular axes unwrapped, shape (m, 3 + n) [m, rad].
         gap: Smallest distance between bodies of the team [m].
         share: Share of the usual number of moves that is tried [-].
     """
@@ -122,7 +122,7 @@ def centred_in_narrow_passages(problem: PlanningProblem, path: FloatArray, gap: 
 
     Args:
         problem: The question.
-        path: A free path, theta unwrapped, shape (m, 3 + n) [m, rad].
+        path: A free path, circular axes unwrapped, shape (m, 3 + n) [m, rad].
         gap: Smallest distance between bodies of the team [m].
     """
     clearance = path_clearance(problem, path, NARROW)
@@ -141,7 +141,7 @@ def margins_to_try(problem: PlanningProblem, path: FloatArray) -> Iterator[float
 
     Args:
         problem: The question, whose settings hold the largest margin.
-        path: A free path, theta unwrapped, shape (m, 3 + n) [m, rad].
+        path: A free path, circular axes unwrapped, shape (m, 3 + n) [m, rad].
     """
     largest = problem.settings.margin
     clearance = path_clearance(problem, path, largest / MARGIN_FRACTIONS[0])

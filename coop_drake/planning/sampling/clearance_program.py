@@ -49,7 +49,7 @@ def with_wider_passages(
 
     Args:
         problem: The question, on whose floor all samples are free.
-        path: Samples, close together, theta unwrapped, shape (m, 3 + n).
+        path: Samples, close together, circular axes unwrapped, shape (m, 3 + n).
         most: Largest move of a sample in any scaled axis [m].
         spacing: Largest distance of neighbours in any scaled axis that the moves may lead to [m].
     """

@@ -50,7 +50,7 @@ def smoothed(
 
     Args:
         problem: The question.
-        path: Configurations that keep the clearance, theta unwrapped, shape (m, 3 + n).
+        path: Configurations that keep the clearance, circular axes unwrapped, shape (m, 3 + n).
         clearance: Distance from the walls that the path keeps before and after [m].
         margin: Margin that the boxes must keep; only clearance above it makes them wide [m].
         gap: Distance that pairs of bodies keep [m].
@@ -88,7 +88,7 @@ def estimated_duration(problem: PlanningProblem, path: FloatArray) -> float:
 
     Args:
         problem: The question.
-        path: Configurations, theta unwrapped, shape (m, 3 + n).
+        path: Configurations, circular axes unwrapped, shape (m, 3 + n).
     """
     scale, team = configuration_scale(problem.tree), problem.tree.arrays
     samples = densified(path, scale, SPACING)
@@ -107,7 +107,7 @@ def path_clearance(problem: PlanningProblem, path: FloatArray, most: float) -> f
 
     Args:
         problem: The question.
-        path: Configurations, theta unwrapped, shape (m, 3 + n).
+        path: Configurations, circular axes unwrapped, shape (m, 3 + n).
         most: Clearances above this one do not matter [m].
 
     Returns:

@@ -82,7 +82,7 @@ def ease_less(eased: Eased, path: FloatArray, amount: float, enough: float = 0.0
 
     Args:
         eased: The question made easier by an amount.
-        path: A path that is free with ``amount``, theta unwrapped, shape (m, 3 + n).
+        path: A path that is free with ``amount``, circular axes unwrapped, shape (m, 3 + n).
         amount: The amount.
         enough: Amount at which it may stop.
 
@@ -180,7 +180,7 @@ def repaired(problem: PlanningProblem, path: FloatArray, growth: float) -> tuple
 
     Args:
         problem: The question.
-        path: A path on the floor widened by ``growth``, theta unwrapped, shape (m, 3 + n).
+        path: A path on the floor widened by ``growth``, circular axes unwrapped, shape (m, 3 + n).
         growth: How far walls were moved back for it [m].
 
     Returns:
@@ -201,7 +201,8 @@ def centred(problem: PlanningProblem, path: FloatArray, short: float) -> tuple[F
 
     Args:
         problem: The question.
-        path: A path that is free with walls moved back by ``short``, theta unwrapped, shape (m, 3 + n).
+        path: A path that is free with walls moved back by ``short``, circular axes unwrapped, shape
+            (m, 3 + n).
         short: That distance; negative where they are moved in, by up to ``LEAST_CLEARANCE`` [m].
 
     Returns:

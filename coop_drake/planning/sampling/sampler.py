@@ -99,7 +99,8 @@ class Sampler:
                 it decides in which directions the team turns.
 
         Returns:
-            Configurations with theta unwrapped, shape (m, 3 + n) [m, rad]; no rows if no path was found.
+            Configurations with circular axes unwrapped, shape (m, 3 + n) [m, rad]; no rows if no path was
+            found.
         """
         robots, subsystem = self._hierarchy.robots, self._hierarchy.subsystem
         steps = 2 + 2 * len(robots)

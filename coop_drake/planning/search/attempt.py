@@ -28,7 +28,7 @@ class BoxSequence:
 
     Attributes:
         boxes: From the start's box to the goal's box.
-        path: The path that they cover, theta unwrapped, shape (m, 3 + n) [m, rad].
+        path: The path that they cover, circular axes unwrapped, shape (m, 3 + n) [m, rad].
         margin: The margin that the path's positions keep in every box [m].
     """
 

@@ -113,7 +113,7 @@ class SampledSearch:
         """Sample paths around another one, which need not be free, and cover them at margin zero.
 
         Args:
-            guide: Configurations, theta unwrapped, shape (m, 3 + n) [m, rad].
+            guide: Configurations, circular axes unwrapped, shape (m, 3 + n) [m, rad].
 
         Returns:
             The boxes, or None if no path was found or covered.
