@@ -47,8 +47,8 @@ class Channel:
         path: The path that the boxes were laid along, circular axes unwrapped like theirs, shape (m, 3 + n)
             [m, rad]; None if they were found without a path.
         ends: Where that path leaves each box, shape (boxes, 2) [m]; None without a path.
-        end: The configuration in which it ends without a path, circles modulo a turn, shape (3 + n,) [m, rad];
-            None for the middle of the goal.
+        end: The configuration in which it ends without a path, circles modulo a turn, shape (3 + n,)
+            [m, rad]; None for the middle of the goal.
     """
 
     boxes: tuple[FreeBox, ...]
