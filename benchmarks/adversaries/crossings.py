@@ -1,4 +1,4 @@
-"""Questions of two arms that are in each other's way."""
+"""Questions of two arms, or two discs, that are in each other's way."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from coop_drake.answers import PlanningProblem
 from coop_drake.tree.component_tree import Body, Component, ComponentTree, ConvexShape, TreeJoint
 from coop_drake.tree.pose import PlanarPose
 
-__all__ = ["crossing_question"]
+__all__ = ["crossing_question", "discs_in_a_corridor"]
 
 REACH, HALF_WIDTH = 0.6, 0.03
 """How far the arms reach from their joints, half their width [m]."""
@@ -43,6 +43,23 @@ def crossing_question(seed: int, *, crossed: str) -> PlanningProblem:
     return PlanningProblem(
         box(0, 0, 5, 4), tree, np.array([*ends[0], first, other[0]]), ends[1], (goal, None)
     )
+
+
+def discs_in_a_corridor(width: float) -> PlanningProblem:
+    """Two discs of 0.3 m whose centres may be 0.5 m to 0.7 m apart shall change their order.
+
+    Args:
+        width: Of the corridor [m]; where there is no way, walls squeeze the discs together.
+    """
+    joint = TreeJoint("slide", "prismatic", 0, 0, PlanarPose(), 1.0, (1.0, 0.0), 0.5, 0.7)
+    disc = ConvexShape(np.zeros((1, 2)), 0.3)
+    components = (
+        Component("object", None, None, (Body("first", None, (disc,)),)),
+        Component("slider", 0, joint, (Body("second", 0, (disc,)),)),
+    )
+    start, goal = np.array([3.0, 0.5, 0.0, 0.65]), np.array([3.0, 0.5, pi])
+    tree = ComponentTree(components, frozenset())
+    return PlanningProblem(box(0.0, 0.0, 6.0, width), tree, start, goal, (None,))
 
 
 def _plate(x_lower: float, x_upper: float, y: float) -> ConvexShape:

@@ -27,6 +27,7 @@ from benchmarks.adversaries.plans import other_floor, other_team
 from benchmarks.adversaries.witnesses import (
     overlap_altered,
     overlap_forged,
+    squeeze_altered,
     sweep_added,
     sweep_altered,
     sweep_dropped,
@@ -109,6 +110,19 @@ def cell_doubled(question: Document, answer: Document, random: Random, k: int) -
     cells.insert(0, copy)
     answer["slices"][k]["cells"] = [cells[i] for i in random.permutation(len(cells))]
     return SOUND
+
+
+@in_slice("cells")
+def corners_added(question: Document, answer: Document, random: Random, k: int) -> Change | None:
+    """A cell has a hair along an axis, with a hundred corners: bounding boxes of its parts are flat."""
+    cells = answer["slices"][k]["cells"]
+    polygon = cells[chosen(cells, random)]["polygon"]
+    ring = [polygon["outer"], *polygon["holes"]][chosen([0, *polygon["holes"]], random)]
+    (x, y), corner = ring[-1], int(random.integers(2))
+    end = (x + step(random), y) if corner else (x, y + step(random))
+    there = np.linspace((x, y), end, 100).tolist()
+    ring += [*there[1:], *there[-2:0:-1]]
+    return Change((k,))
 
 
 def slice_dropped(question: Document, answer: Document, random: Random) -> Change:
@@ -212,6 +226,7 @@ PROOF_ALTERATIONS: dict[str, Alteration] = {
     "cell reshaped": cell_reshaped,
     "cell cut": cell_cut,
     "cell twice": cell_doubled,
+    "corners added": corners_added,
     "slice left out": slice_dropped,
     "slice moved": slice_moved,
     "slices exchanged": slice_exchanged,
@@ -221,6 +236,7 @@ PROOF_ALTERATIONS: dict[str, Alteration] = {
     "polygon added": sweep_added,
     "overlap forged": overlap_forged,
     "overlap altered": overlap_altered,
+    "squeeze altered": squeeze_altered,
     "another subject": other_subject,
     "other ends": other_ends,
     "another floor": other_floor,

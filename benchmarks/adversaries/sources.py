@@ -6,7 +6,7 @@ from collections.abc import Callable
 from functools import partial
 
 from benchmarks.adversaries.bends import bend_question
-from benchmarks.adversaries.crossings import crossing_question
+from benchmarks.adversaries.crossings import crossing_question, discs_in_a_corridor
 from benchmarks.adversaries.questions import random_question
 from benchmarks.planner.family import corridor_problem
 from coop_drake.answers import PlanningProblem
@@ -28,6 +28,7 @@ SLICES: dict[str, Ask] = {
     **{f"bend {seed}": partial(bend_question, seed, "object") for seed in range(8)},
 }
 JOINTS: dict[str, Ask] = {
+    "squeezed": partial(discs_in_a_corridor, 1.1),
     "three_closed": partial(corridor_problem, 0.95, 1.5, 3),
     **{f"hinge {seed}": partial(bend_question, seed, "revolute") for seed in (0, 2, 3, 5)},
     **{f"slide {seed}": partial(bend_question, seed, "prismatic") for seed in (0, 1, 3, 4, 5)},

@@ -7,7 +7,14 @@ import numpy as np
 from benchmarks.adversaries.alterations import SOUND, Change, chosen, in_slice, move, step
 from benchmarks.adversaries.collisions import Document
 
-__all__ = ["overlap_altered", "overlap_forged", "sweep_added", "sweep_altered", "sweep_dropped"]
+__all__ = [
+    "overlap_altered",
+    "overlap_forged",
+    "squeeze_altered",
+    "sweep_added",
+    "sweep_altered",
+    "sweep_dropped",
+]
 
 Random = np.random.Generator
 
@@ -77,4 +84,25 @@ def overlap_altered(question: Document, answer: Document, random: Random, k: int
         overlap["pieces"][chosen(overlap["pieces"], random)] += int(random.choice([-1, 1]))
     else:
         witnesses.remove(overlap)
+    return Change((k,))
+
+
+@in_slice("squeezes")
+def squeeze_altered(question: Document, answer: Document, random: Random, k: int) -> Change | None:
+    """A cut lies elsewhere or is turned, by a unit in the last place or more, or a polygon is larger."""
+    squeezes = answer["slices"][k]["squeezes"]
+    squeeze, kind = squeezes[chosen(squeezes, random)], int(random.integers(4))
+    cut = squeeze["cuts"][chosen(squeeze["cuts"], random)]
+    by = float(random.choice([-1.0, 1.0])) * step(random, 1e-16)
+    if kind == 0:
+        cut["limit"] += by
+    elif kind == 1:
+        cut["direction"][int(random.integers(2))] += by
+    elif kind == 2:
+        corners = np.array(squeeze["polygon"])
+        squeeze["polygon"] = (corners + abs(by) * (corners - corners.mean(axis=0))).tolist()
+    else:  # Through a corner of the polygon, as near as rounding allows.
+        corner = squeeze["polygon"][chosen(squeeze["polygon"], random)]
+        along = float(np.dot(cut["direction"], corner))
+        cut["limit"] = along + by * (1.0 if random.random() < 0.5 else 0.0)
     return Change((k,))

@@ -3,16 +3,14 @@
 from dataclasses import replace
 
 import numpy as np
-from shapely import box
 
+from benchmarks.adversaries.crossings import discs_in_a_corridor
 from benchmarks.planner.family import corridor_problem
-from coop_drake.answers.problem import PlanningProblem
 from coop_drake.planning import find_channel
 from coop_drake.planning.cells.exploration import Exploration, Verdict
 from coop_drake.planning.cells.squeezes import Squeezes
 from coop_drake.planning.questions.relaxation import relaxed
-from coop_drake.tree.component_tree import Body, Component, ComponentTree, ConvexShape, TreeJoint
-from coop_drake.tree.pose import PlanarPose
+from coop_drake.tree.component_tree import ComponentTree
 from coop_drake.verification import verify_proof
 from tests.support.free_positions import FreePositions
 
@@ -51,19 +49,6 @@ def test_walls_that_squeeze_two_bases_together_close_a_corridor_with_few_slices(
         for share in random.random((5, len(intervals))):
             angles = [low + part * (high - low) for part, (low, high) in zip(share, intervals, strict=True)]
             assert not FreePositions(question.tree, question.workspace, angles).free(positions).any()
-
-
-def discs_in_a_corridor(width):
-    """Two discs of 0.3 m whose centres may be 0.5 m to 0.7 m apart shall change their order."""
-    joint = TreeJoint("slide", "prismatic", 0, 0, PlanarPose(), 1.0, (1.0, 0.0), 0.5, 0.7)
-    disc = ConvexShape(np.zeros((1, 2)), 0.3)
-    components = (
-        Component("object", None, None, (Body("first", None, (disc,)),)),
-        Component("slider", 0, joint, (Body("second", 0, (disc,)),)),
-    )
-    start, goal = np.array([3.0, 0.5, 0.0, 0.65]), np.array([3.0, 0.5, np.pi])
-    tree = ComponentTree(components, frozenset())
-    return PlanningProblem(box(0.0, 0.0, 6.0, width), tree, start, goal, (None,))
 
 
 def test_a_proof_with_squeezed_pairs_is_written_down_and_holds():
