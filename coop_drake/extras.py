@@ -5,11 +5,13 @@ from __future__ import annotations
 _EXTRAS = {
     "cma": "tune",
     "collada": "robots",
+    "cssselect2": "floor-plans",
     "defusedxml": "robots",
     "distributed": "campaign",
     "ezdxf": "floor-plans",
     "pyarrow": "campaign",
     "svgelements": "floor-plans",
+    "tinycss2": "floor-plans",
     "trimesh": "robots",
     "zmq": "apart",
 }

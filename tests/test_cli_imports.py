@@ -40,14 +40,6 @@ def test_planning_and_verifying_import_no_pictures(tmp_path):
         assert modules.isdisjoint({"matplotlib", "meshcat"})
 
 
-def test_what_the_models_give_is_read_again_without_drake(tmp_path):
-    room = write_scenario(tmp_path / "room.scenario.yaml")
-    assert "pydrake" in called("plan", room, "--out", tmp_path, "--quiet")[1]
-    for command in (("plan", room, "--out", tmp_path), ("verify", tmp_path / "plan.json", room)):
-        code, modules = called(*command, "--quiet")
-        assert (code, modules & {"pydrake", "scipy"}) == ("0", set())
-
-
 def test_the_whole_package_is_imported_without_numpy():
     loaded = "import coop_drake, sys; print(*sys.modules)"
     modules = subprocess.run(

@@ -166,7 +166,7 @@ def test_scenarios_and_plans_are_shown(ending, tmp_path, monkeypatch):
     plan = replace(small_plan(names), problem=problem_digest(problem))
     file = save_plan(plan, tmp_path / "plan.json")
     task = Task(load_scenario("base"), problem)
-    monkeypatch.setattr(show, "read_task", lambda _: task)
+    monkeypatch.setattr(show, "read_task", lambda *_, **__: task)
     target = tmp_path / "pictures" / f"room.{ending}"
     assert invoke("show", "room.scenario.yaml", "--out", target).exit_code == 0
     bare = target.read_bytes()

@@ -232,7 +232,7 @@ def plan_mutants(folder: Path) -> list[Mutant]:
 
 def test_malformed_plans_are_refused(bench, monkeypatch):
     plan, task = planned()
-    monkeypatch.setattr(simulate, "read_task", lambda *_: task)
+    monkeypatch.setattr(simulate, "read_task", lambda *_, **__: task)
     file = save_plan(plan, bench.folder / "mutant.json")
     assert load_plan(file).joint_names == plan.joint_names
     bench.judge(
@@ -262,7 +262,7 @@ def proof_mutants(index: int, folder: Path) -> list[Mutant]:
 def test_malformed_proofs_are_refused(index, bench, monkeypatch):
     problem = CORRIDORS[index]
     task = Task(load_scenario("base"), problem)
-    monkeypatch.setattr(verify, "read_task", lambda *_: task)
+    monkeypatch.setattr(verify, "read_task", lambda *_, **__: task)
     file = bench.folder / "mutant.json"
     save_proof(proved(index), problem, file)
     assert verify_file(file, problem, GAINS).answer == "infeasible"

@@ -60,6 +60,7 @@ def replay(
     scenario = variation.scenario_of(run)
     plans = Plans(variation, folder.plans)
     plan = plans.plan_of(run)
+    reporter.note(scenario.workspace.notes)
     task = Task(scenario, planning_problem(scenario))
     results = ResultFolder.of(task.name, folder.path / "replays" / str(index), "simulation")
     counted = _counted(index, "drake", folder, batches)

@@ -60,7 +60,7 @@ def compare_command(
 def _compare(scenario: Path, gains: str | None, out: Path | None, reporter: Reporter) -> ExitCode:
     from coop_drake.files import write_atomically
 
-    task = read_task(scenario, gains)
+    task = read_task(scenario, gains, reporter)
     folder = ResultFolder.of(task.name, out, "plan", "comparison", below="compare")
     plan = plan_of(task, folder, reporter)
     if plan is None:

@@ -36,7 +36,7 @@ def _draw(scenario: Path, robot: int, out: Path | None, reporter: Reporter) -> E
     from coop_drake.scenario import assemble
     from coop_drake.viz.block_diagram import block_diagram_figure
 
-    task = read_task(scenario, None)
+    task = read_task(scenario, reporter=reporter)
     robots = assemble(task.scenario).robots
     if robot >= len(robots):
         raise ScenarioError(str(scenario), "--robot", robot, f"a number from 0 to {len(robots) - 1}")

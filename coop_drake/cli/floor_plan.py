@@ -91,7 +91,7 @@ def _tell(plan: FloorPlan, file: Path, reporter: Reporter) -> None:
         corners=corners,
         corners_drawn=drawn,
         other_rooms=len(plan.others),
-        notes=list(plan.notes),
+        notes=[],
     )
     rows = [
         ("from", f"({x:.3f}, {y:.3f}) m"),
@@ -104,8 +104,7 @@ def _tell(plan: FloorPlan, file: Path, reporter: Reporter) -> None:
     if plan.others:
         rows.append(("other rooms", f"{len(plan.others)}, the largest {plan.others[0]:.2f} m²"))
     reporter.table(file.name, rows)
-    for note in plan.notes:
-        reporter.say(f"Note: {escape(note)}")
+    reporter.note(plan.notes)
 
 
 def _write(plan: FloorPlan, file: Path, target: Path, inside: tuple[float, float] | None) -> None:

@@ -64,7 +64,7 @@ def tune(
     """Search better gains for a scenario's plan, verify them by simulation, and write them."""
     load_optimizer()
     weights, limits = read_weights(request.criteria), tuple(map(Limit.parse, request.limits))
-    task = read_task(scenario, gains)
+    task = read_task(scenario, gains, reporter)
     start = task.scenario.gain_sets[task.scenario.selected_gains]
     parameters = tunable_parameters(start, request.vary)
     folder = ResultFolder.of(task.name, out, "plan", "tuning", below=TUNED)

@@ -187,15 +187,17 @@ def _write(starter: Starter, folder: Path, reporter: Reporter, *, force: bool) -
         try:
             with reporter.stage("checking"):
                 path = Path(draft) / f"{starter.name}.scenario.yaml"
-                _refuse_blocked_goal(planning_problem(load_scenario(path)), path)
+                scenario = load_scenario(path)
+                _refuse_blocked_goal(planning_problem(scenario), path)
         except ScenarioError as error:  # The draft is gone when the message is read.
-            file = error.file.replace(str(Path(draft)), str(folder))
-            raise ScenarioError(file, error.key, error.value, error.allowed) from error
+            named = error.file.replace(str(Path(draft)), str(folder))
+            raise ScenarioError(named, error.key, error.value, error.allowed) from error
         folder.mkdir(exist_ok=True)
         for name in files:
             (Path(draft) / name).replace(folder / name)
-    scenario = folder / f"{starter.name}.scenario.yaml"
-    reporter.facts.update(scenario=str(scenario), files=sorted(str(folder / name) for name in files))
+    reporter.note(scenario.workspace.notes)
+    file = folder / f"{starter.name}.scenario.yaml"
+    reporter.facts.update(scenario=str(file), files=sorted(str(folder / name) for name in files))
     reporter.say(f"Written: {', '.join(escape(str(folder / name)) for name in files)}")
-    reporter.say(f"Next: coop-drake run {escape(str(scenario))}")
+    reporter.say(f"Next: coop-drake run {escape(str(file))}")
     return ExitCode.DONE

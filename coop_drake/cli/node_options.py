@@ -48,7 +48,7 @@ def problem_of(scenario: Path, gains: str | None, plan: Path | None, reporter: R
     """
     from coop_drake.diagram import control_period
 
-    task = read_task(scenario, gains)
+    task = read_task(scenario, gains, reporter)
     control_period(task.scenario)
     return task, read_plan(task, plan or ResultFolder.of(task.name, None).plan, reporter)
 

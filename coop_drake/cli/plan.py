@@ -42,7 +42,7 @@ def plan_command(
 ) -> None:
     """Plan only: write the plan, a way that limits refuse, or the proof that there is none."""
     with reporting(machine=machine, quiet=quiet, verbose=verbose) as reporter:
-        task = read_task(scenario, gains)
+        task = read_task(scenario, gains, reporter)
         folder = ResultFolder.of(task.name, out, "plan")
         if plan_of(task, folder, reporter, budget, effort=effort, workers=workers):
             reporter.table(task.name, summary_rows(reporter.facts, verbose=reporter.verbose))

@@ -162,6 +162,13 @@ class Reporter:
         """Show a line of text, with rich's markup."""
         self._console.print(text, soft_wrap=True)
 
+    def note(self, sentences: Sequence[str]) -> None:
+        """Show and note sentences about what a reader left out or assumed; without any nothing changes."""
+        if sentences:
+            self.facts["notes"] = list(sentences)
+        for sentence in sentences:
+            self.say(f"Note: {escape(sentence)}")
+
     def table(
         self,
         title: str,

@@ -93,13 +93,12 @@ def _import(
     lines = scenario_lines(target, joints, frame)
     reporter.facts.update(
         model=str(target),
-        notes=list(robot.notes),
+        notes=[],
         joints={joint.name: joint.verdict for joint in joints},
         scenario_lines=lines,
     )
     reporter.table(f"{model.name}: joints", [(joint.name, _words(joint)) for joint in joints])
-    for note in robot.notes:
-        reporter.say(f"Note: {escape(note)}")
+    reporter.note(robot.notes)
     reporter.say(
         f"The model is {escape(str(target))}; a scenario uses it with these lines:\n\n{escape(lines)}"
     )

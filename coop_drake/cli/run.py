@@ -80,7 +80,7 @@ def run_command(
 ) -> None:
     """Plan, map, simulate and record a transport."""
     with reporting(machine=machine, quiet=quiet, verbose=verbose) as reporter:
-        task = read_task(scenario, gains)
+        task = read_task(scenario, gains, reporter)
         simulation = simulation_of(
             task,
             blocks,

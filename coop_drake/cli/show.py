@@ -33,7 +33,7 @@ def show_command(
         from coop_drake.drawing import house_style, save_figure
         from coop_drake.viz.floor_figures import overview_figure
 
-        task = read_task(scenario)
+        task = read_task(scenario, reporter=reporter)
         found = None if plan is None else read_plan(task, plan, reporter)
         caption = f"{task.name}: start and goal"
         if found is not None:

@@ -68,7 +68,7 @@ def simulate_command(
 ) -> None:
     """Map, simulate and record a plan that was made before."""
     with reporting(machine=machine, quiet=quiet, verbose=verbose) as reporter:
-        task = read_task(scenario, gains)
+        task = read_task(scenario, gains, reporter)
         simulation = simulation_of(
             task,
             blocks,

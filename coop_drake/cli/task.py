@@ -9,6 +9,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from coop_drake.answers import PlanningProblem
+    from coop_drake.cli.reporter import Reporter
     from coop_drake.scenario import Scenario
 
 
@@ -30,15 +31,23 @@ class Task:
         return self.scenario.name
 
 
-def read_task(path: Path, gains: str | None = None) -> Task:
-    """Read a scenario and its models; ``gains`` as in `coop_drake.scenario.with_gains`.
+def read_task(path: Path, gains: str | None = None, reporter: Reporter | None = None) -> Task:
+    """Read a scenario and its models.
+
+    Args:
+        path: The file of the scenario.
+        gains: As in `coop_drake.scenario.with_gains`.
+        reporter: Shows what the reader of the floor plan left out or assumed; None for nobody.
 
     Raises:
         ScenarioError: The file, a model or the gain set is wrong.
+        FloorPlanError: The floor plan cannot be read.
     """
     from coop_drake.plant import planning_problem
     from coop_drake.scenario import load_scenario
     from coop_drake.scenario.gain_file import with_gains
 
     scenario = with_gains(load_scenario(path), gains)
+    if reporter is not None:
+        reporter.note(scenario.workspace.notes)
     return Task(scenario, planning_problem(scenario))

@@ -50,7 +50,7 @@ def verify_command(
 ) -> None:
     """Check a plan, a proof that there is none, or a run by its log, by code of its own."""
     with reporting(machine=machine, quiet=quiet) as reporter:
-        task = read_task(scenario)
+        task = read_task(scenario, reporter=reporter)
         if question is not None:
             from coop_drake.verification.question import save_question
 

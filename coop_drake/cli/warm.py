@@ -24,7 +24,7 @@ _SIMULATED_SECONDS = 0.05
 def warm_command(scenario: ScenarioPath, quiet: Quiet = False) -> None:
     """Compile all kernels, so that the next command starts at once; `make` does it when it sets up."""
     with reporting(quiet=quiet) as reporter:
-        task = read_task(scenario)
+        task = read_task(scenario, reporter=reporter)
         with reporter.stage("compiling") as progress:
             _compile(task, progress)
 

@@ -70,7 +70,7 @@ def watch_command(
 ) -> None:
     """Watch the planner search: pictures, a moving picture and a page to turn in space."""
     with reporting(machine=machine, quiet=quiet) as reporter:
-        task = read_task(scenario)
+        task = read_task(scenario, reporter=reporter)
         folder = ResultFolder.of(task.name, output, "search", below="think")
         reporter.code = _watch(task.problem, folder, frames, strategy, margin, reporter)
         if reporter.code is ExitCode.DONE:

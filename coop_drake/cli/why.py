@@ -28,7 +28,7 @@ def why_command(
     with reporting(machine=machine, quiet=quiet) as reporter:
         from coop_drake.diagnosis import Answer, diagnose, facts_of
 
-        task = read_task(scenario)
+        task = read_task(scenario, reporter=reporter)
         folder, before = ResultFolder.of(task.name, out, "diagnosis"), process_time()
         with reporter.stage("diagnosing") as progress:
             diagnosis = diagnose(task.problem, progress)

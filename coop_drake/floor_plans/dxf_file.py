@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import logging
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from math import isfinite
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -28,6 +28,22 @@ _REQUIRED = {
 }
 """Attributes that ezdxf would replace by a default if they were missing."""
 
+_NO_WALLS = (
+    "DIMENSION",
+    "ARC_DIMENSION",
+    "LARGE_RADIAL_DIMENSION",
+    "LEADER",
+    "MULTILEADER",
+    "MLEADER",
+    "HATCH",
+)
+"""Entities that draw lines, which are no walls: they measure, explain or fill what is drawn beside them."""
+
+_EXPLODE = "explode the blocks in the CAD program"
+_SIMILAR = 1e-9
+"""Ratio by which a block may be stretched in one direction and still count as one that is not."""
+_DEEPEST = 50
+"""Blocks inside each other that are allowed."""
 _MOST_ENTITIES = 200_000
 """Entities that are read at most: blocks inside blocks can multiply without end."""
 _MOST_WARNINGS = 5
@@ -37,36 +53,34 @@ _MOST_WARNINGS = 5
 def read_dxf(path: Path, settings: FloorPlanSettings) -> Drawing:
     """Read lines, polylines, arcs, circles, ellipses, splines and solids of the visible layers.
 
+    Dimensions, leaders, hatches and texts are no walls; a note counts them.
+
     Raises:
-        FloorPlanError: The file is damaged, or does not say its unit.
+        FloorPlanError: The file is damaged, does not say its unit, or shows a part of another file.
     """
     file = str(path)
     with _warnings() as warnings:
         document = _document(path)
     metre = settings.metres(_UNITS.get(int(document.header.get("$INSUNITS", 0))), file)
-    names = {layer.dxf.name: layer for layer in document.layers}
-    hidden = {name for name, layer in names.items() if layer.is_off() or layer.is_frozen()}
     walls: list[Wall] = []
     ignored: Counter[str] = Counter()
-    used: set[str] = set()
+    chosen = {layer.lower() for layer in settings.layers}
+    used: dict[str, str] = {}
     points = 0
-    for entity in _entities(document, file):
-        layer = _layer_of(entity)
-        used.add(layer)
-        if layer in hidden or entity.dxf.get("invisible", 0):
+    for shown in _entities(document, file):
+        used.setdefault(shown.layer.lower(), shown.layer)
+        if not shown.visible or (chosen and shown.layer.lower() not in chosen):
             continue
-        if settings.layers and layer not in settings.layers:
-            continue
-        made = _walls_of(entity, layer, metre, settings.sagitta, file)
+        made = _walls_of(shown, metre, settings.sagitta, file)
         if made is None:
-            ignored[entity.dxftype()] += 1
+            ignored[shown.entity.dxftype()] += 1
             continue
         points += sum(len(wall.points) for wall in made)
         refuse_many(file, points)
         walls += made
     for layer in settings.layers:
-        if layer not in used:
-            known = ", ".join(sorted(used)) or "none"
+        if layer.lower() not in used:
+            known = ", ".join(sorted(used.values())) or "none"
             raise FloorPlanError(file, "layers", f"nothing is drawn on layer {layer!r}", f"known: {known}")
     notes = [f"{count} {kind} left out" for kind, count in sorted(ignored.items())]
     notes += [f"while reading: {line}" for line in warnings[:_MOST_WARNINGS]]
@@ -107,42 +121,89 @@ def _document(path: Path) -> Any:
         raise FloorPlanError(file, "the file", f"no readable DXF ({_one_line(error)})", remedy) from error
 
 
-def _entities(document: Any, file: str) -> Iterator[Any]:
+class _Shown(NamedTuple):
+    """An entity as it is shown.
+
+    Attributes:
+        entity: The entity, in the coordinates of its block.
+        matrix: From these to the model space, a ``Matrix44``.
+        layer: The layer that it is shown on: entities on layer 0 of a block take the layer of the block.
+        visible: Whether it is seen: a layer that is off hides what lies on it, one that is frozen also what
+            is inside the blocks on it.
+    """
+
+    entity: Any
+    matrix: Any
+    layer: str
+    visible: bool
+
+
+def _entities(document: Any, file: str) -> Iterator[_Shown]:
     """Yield all entities with blocks dissolved; refuse too many."""
-    from ezdxf.disassemble import recursive_decompose
     from ezdxf.lldxf.const import DXFError
+    from ezdxf.math import Matrix44
+    from ezdxf.protocols import virtual_entities
+
+    layers = {layer.dxf.name.lower(): layer for layer in document.layers}
+    off = {name for name, layer in layers.items() if layer.is_off() or layer.is_frozen()}
+    frozen = {name for name, layer in layers.items() if layer.is_frozen()}
+
+    def dissolved(
+        entities: Iterable[Any], matrix: Any, outer: str, hidden: bool, depth: int
+    ) -> Iterator[_Shown]:
+        if depth > _DEEPEST:
+            raise FloorPlanError(file, "a block", f"more than {_DEEPEST} blocks inside each other", _EXPLODE)
+        for entity in entities:
+            own = str(entity.dxf.get("layer", "0"))
+            layer = outer if own == "0" else own
+            unseen = hidden or bool(entity.dxf.get("invisible", 0))
+            kind = entity.dxftype()
+            if kind == "INSERT":
+                unseen = unseen or layer.lower() in frozen
+                yield from dissolved(entity.attribs, matrix, layer, unseen, depth + 1)
+                for one in entity.multi_insert() if entity.mcount > 1 else (entity,):
+                    block = _block_of(one, file, unseen=unseen)
+                    yield from dissolved(block, one.matrix44() @ matrix, layer, unseen, depth + 1)
+            elif kind not in _NO_WALLS and hasattr(entity, "__virtual_entities__"):
+                yield from dissolved(virtual_entities(entity), matrix, layer, unseen, depth + 1)
+            else:
+                yield _Shown(entity, matrix, layer, not unseen and layer.lower() not in off)
 
     try:
-        for count, entity in enumerate(recursive_decompose(document.modelspace())):
+        for count, shown in enumerate(dissolved(document.modelspace(), Matrix44(), "0", False, 0)):
             if count >= _MOST_ENTITIES:
                 finding = f"more than {_MOST_ENTITIES:,} entities"
                 raise FloorPlanError(file, "the model space", finding, "delete what are no walls")
-            yield entity
+            yield shown
     except (DXFError, RecursionError, ValueError, ZeroDivisionError) as error:
         raise FloorPlanError(
-            file,
-            "a block",
-            f"it cannot be dissolved ({_one_line(error)})",
-            "explode the blocks in the CAD program",
+            file, "a block", f"it cannot be dissolved ({_one_line(error)})", _EXPLODE
         ) from error
 
 
-def _layer_of(entity: Any) -> str:
-    """The layer that an entity is shown on; entities on layer 0 of a block take the layer of the block."""
-    layer = str(entity.dxf.get("layer", "0"))
-    block = entity.source_block_reference
-    return layer if layer != "0" or block is None else _layer_of(block)
+def _block_of(insert: Any, file: str, *, unseen: bool) -> Iterable[Any]:
+    """The entities of the block that is inserted; refuse one of another file, unless it is not seen."""
+    block, name = insert.block(), insert.dxf.get("name")
+    if block is not None and not (block.block.is_xref or block.block.is_xref_overlay):
+        return (entity for entity in block if entity.dxftype() != "ATTDEF")
+    if unseen:
+        return ()
+    finding = "it is drawn in another file" if block is not None else "the file does not define it"
+    raise FloorPlanError(file, f"the block {name!r}", finding, "bind it in the CAD program, or delete it")
 
 
-def _walls_of(entity: Any, layer: str, metre: float, sagitta: float, file: str) -> list[Wall] | None:
-    """The walls that an entity draws; None for a kind of entity that draws no lines."""
+def _walls_of(shown: _Shown, metre: float, sagitta: float, file: str) -> list[Wall] | None:
+    """The walls that an entity draws; None for a kind of entity that draws none."""
     from ezdxf.lldxf.const import DXFError
     from ezdxf.path import make_path
 
+    entity, layer = shown.entity, shown.layer
     place = f"{entity.dxftype()} {entity.dxf.get('handle') or ''} on layer {layer!r}".replace("  ", " ")
+    if entity.dxftype() in _NO_WALLS:
+        return None
     _refuse_no_numbers(entity, file, place)
     try:
-        outline = make_path(entity)
+        outline = make_path(entity).transform(shown.matrix)
         pieces = [np.array(piece) * metre for subpath in outline.sub_paths() for piece in _pieces(subpath)]
     except TypeError:
         return None
@@ -152,12 +213,14 @@ def _walls_of(entity: Any, layer: str, metre: float, sagitta: float, file: str) 
         ) from error
     if not pieces:
         return []
-    width = 0.5 * _width(entity) * metre
+    most, least = np.linalg.svd([shown.matrix.get_row(k)[:2] for k in (0, 1)], compute_uv=False)
+    width = 0.5 * _width(entity) * float(most) * metre
     walls = []
     for run in _runs(pieces):
         points, strays = flatten(run, sagitta, from_arcs=True)
         closed = len(points) > 3 and bool(np.hypot(*(points[0] - points[-1])) <= 1e-9)
-        walls.append(Wall(points[:-1] if closed else points, width + strays, closed, place))
+        flat = width > 0.0 and strays == 0.0 and most - least <= _SIMILAR * most
+        walls.append(Wall(points[:-1] if closed else points, width + strays, closed, place, flat=bool(flat)))
     return walls
 
 

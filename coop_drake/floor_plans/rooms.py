@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import shapely
-from shapely import LinearRing, LineString, Point, Polygon
+from shapely import LinearRing, Point, Polygon
 from shapely.geometry.base import BaseGeometry
 from shapely.validation import explain_validity
 
@@ -80,9 +80,8 @@ def room_of(drawing: Drawing, file: str, gap: float, inside: Inside | None) -> R
     for wall in drawing.walls:
         _check(wall, file)
     _check_size(drawing, file)
-    thick = [_thick(wall) for wall in drawing.walls if wall.half_width > 0.0]
-    solid = shapely.union_all(thick)
-    lines = [_line(wall) for wall in drawing.walls if wall.half_width == 0.0]
+    solid = shapely.union_all([wall.body for wall in drawing.walls if wall.half_width > 0.0])
+    lines = [wall.body for wall in drawing.walls if wall.half_width == 0.0]
     noded = shapely.unary_union([*lines, solid.boundary])
     joined = bridges(noded, gap)
     if joined:
@@ -159,16 +158,6 @@ def _check_size(drawing: Drawing, file: str) -> None:
             f"it is {width:.4g} m by {height:.4g} m, which cannot be a floor",
             f"mend unit or scale; {_SMALLEST:g} m to {_LARGEST:g} m are allowed",
         )
-
-
-def _line(wall: Wall) -> LineString:
-    return LineString(wall.coordinates if len(wall.points) > 1 else np.repeat(wall.points, 2, axis=0))
-
-
-def _thick(wall: Wall) -> Any:
-    """The wall with its thickness; mitred corners enclose the round ones."""
-    line = LinearRing(wall.points) if wall.closed else _line(wall)
-    return shapely.buffer(line, wall.half_width, cap_style="square", join_style="mitre", mitre_limit=2.0)
 
 
 def _nothing_closed(noded: BaseGeometry, file: str, gap: float) -> FloorPlanError:

@@ -6,7 +6,8 @@ import re
 from dataclasses import dataclass
 from math import isclose, isfinite
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
+from xml.etree.ElementTree import TreeBuilder
 
 import numpy as np
 
@@ -20,7 +21,11 @@ if TYPE_CHECKING:
 SVG = "{http://www.w3.org/2000/svg}"
 """Namespace of SVG elements."""
 
-_LENGTH = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(px|pt|pc|mm|cm|in)?\s*")
+LABEL = "{http://www.inkscape.org/namespaces/inkscape}label"
+"""Attribute by which Inkscape names a layer."""
+NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
+"""A number as SVG writes it."""
+_LENGTH = re.compile(rf"\s*({NUMBER})\s*(px|pt|pc|mm|cm|in|%)?\s*", re.IGNORECASE)
 _PIXELS = {"px": 1.0, "pt": 96.0 / 72.0, "pc": 16.0, "mm": 96.0 / 25.4, "cm": 96.0 / 2.54, "in": 96.0}
 _PHYSICAL = ("mm", "cm", "in", "pt", "pc")
 _PIXEL = UNITS["in"] / 96.0
@@ -36,12 +41,14 @@ class SvgPage:
         metre: Length of one user unit in W [m].
         left: First coordinate of the page's left edge, in user units.
         bottom: Second coordinate of the lower edge, in user units; y points down in SVG.
+        size: Width and height that percentages refer to, in user units; None if the file does not say them.
     """
 
     root: Element
     metre: float
     left: float
     bottom: float
+    size: tuple[float, float] | None
 
     def place(self, points: FloatArray) -> FloatArray:
         """Points of the root's coordinates in W: the origin is the page's lower left corner, y points up."""
@@ -55,11 +62,14 @@ def read_svg_page(path: Path, settings: FloorPlanSettings) -> SvgPage:
         FloorPlanError: The file is no SVG, is damaged, declares entities, or does not say its size.
     """
     from defusedxml import DefusedXmlException
-    from defusedxml.ElementTree import ParseError, fromstring
+    from defusedxml.ElementTree import DefusedXMLParser, ParseError
 
     file = str(path)
     try:
-        root = fromstring(path.read_bytes(), forbid_dtd=False, forbid_entities=True, forbid_external=True)
+        builder = _Builder()
+        parser = DefusedXMLParser(target=builder, forbid_entities=True, forbid_external=True)
+        parser.feed(path.read_bytes())
+        root = parser.close()
     except DefusedXmlException as error:
         finding = "it declares entities, which can blow up a small file or open others"
         raise FloorPlanError(
@@ -77,21 +87,45 @@ def read_svg_page(path: Path, settings: FloorPlanSettings) -> SvgPage:
         raise FloorPlanError(file, "the file", f"no XML ({error})", "save it anew as plain SVG") from error
     if root.tag not in (f"{SVG}svg", "svg"):
         raise FloorPlanError(file, "the root", f"<{root.tag}> is no SVG drawing", "name an SVG file")
+    if builder.sheets:
+        finding = "it names a style sheet in another file"
+        raise FloorPlanError(file, "<?xml-stylesheet?>", finding, "save it anew as plain SVG")
     return _page(file, root, settings)
 
 
-def length(text: str, file: str, place: str) -> float:
+class _Builder(TreeBuilder):
+    """Builds the tree, and counts style sheets that processing instructions name."""
+
+    sheets = 0
+
+    def pi(self, target: str, text: str | None = None) -> Any:
+        """Take note of a processing instruction."""
+        self.sheets += target == "xml-stylesheet"
+
+
+def name_of(element: Element) -> str:
+    """The name of an element for messages: its tag, and its label or id."""
+    label = element.get(LABEL) or element.get("id")
+    tag = str(element.tag).removeprefix(SVG)
+    return f"<{tag}> {label!r}" if label else f"<{tag}>"
+
+
+def length(text: str, file: str, place: str, whole: float | None = None) -> float:
     """A length in pixels, which are user units inside the page.
 
+    ``whole`` is the length that percentages refer to, None if it is not known.
+
     Raises:
-        FloorPlanError: The text is no number with an absolute unit.
+        FloorPlanError: The text is no number with an absolute unit, or with % of a known length.
     """
     match = _LENGTH.fullmatch(text)
-    if not match:
-        raise FloorPlanError(
-            file, place, f"{text!r} is no length", "give a number, with px, mm, cm, in, pt or pc if any unit"
+    unit = (match[2] or "px").lower() if match else ""
+    if not match or (unit == "%" and whole is None):
+        finding = (
+            f"{text!r} is no length" if not match else f"{text!r} is a part of a size that is not stated"
         )
-    value = float(match[1]) * _PIXELS[match[2] or "px"]
+        raise FloorPlanError(file, place, finding, "give a number, with px, mm, cm, in, pt or pc if any unit")
+    value = float(match[1]) * (0.01 * (whole or 0.0) if unit == "%" else _PIXELS[unit])
     if not isfinite(value):
         raise FloorPlanError(file, place, f"{text!r} is no finite length", "give a finite number")
     return value
@@ -101,10 +135,11 @@ def _page(file: str, root: Element, settings: FloorPlanSettings) -> SvgPage:
     sizes = [root.get("width"), root.get("height")]
     known = [size for size in sizes if size and not size.strip().endswith("%")]
     pixels = [length(size, file, "<svg> width and height") for size in known]
-    view = _view(file, root, pixels if len(pixels) == 2 else None)
+    box = view_box(file, root)
+    view = box or (None if len(pixels) < 2 else (0.0, 0.0, pixels[0], pixels[1]))
     if view is None:
         metre = settings.metres(_PIXEL if _physical(known) else None, file)
-        return SvgPage(root, metre, 0.0, 0.0)
+        return SvgPage(root, metre, 0.0, 0.0, None)
     physical = None
     if _physical(known) and len(pixels) == 2 and settings.unit is None:
         factors = [pixels[0] / view[2], pixels[1] / view[3]]
@@ -112,26 +147,39 @@ def _page(file: str, root: Element, settings: FloorPlanSettings) -> SvgPage:
             finding = "width, height and viewBox stretch the drawing in one direction"
             raise FloorPlanError(file, "<svg> viewBox", finding, "make their ratios equal, or name the unit")
         physical = min(factors) * _PIXEL
-    return SvgPage(root, settings.metres(physical, file), view[0], view[1] + view[3])
+    return SvgPage(root, settings.metres(physical, file), view[0], view[1] + view[3], view[2:])
 
 
 def _physical(sizes: list[str]) -> bool:
     return bool(sizes) and all(size.strip().endswith(_PHYSICAL) for size in sizes)
 
 
-def _view(file: str, root: Element, pixels: list[float] | None) -> tuple[float, float, float, float] | None:
-    """The viewBox (x, y, width, height), or the one that width and height imply; None if neither is given."""
-    text = root.get("viewBox")
+def view_box(file: str, element: Element) -> tuple[float, float, float, float] | None:
+    """The viewBox (x, y, width, height) of an element, None if it has none.
+
+    Raises:
+        FloorPlanError: It is none, or has no area.
+    """
+    text, place = element.get("viewBox"), f"{name_of(element)} viewBox"
     if text is None:
-        return None if pixels is None else (0.0, 0.0, pixels[0], pixels[1])
+        return None
     try:
-        x, y, width, height = (float(part) for part in re.split(r"[\s,]+", text.strip()))
+        x, y, width, height = numbers(text)
     except ValueError:
         raise FloorPlanError(
-            file, "<svg> viewBox", f"{text!r} is no box", "give four numbers: x, y, width, height"
+            file, place, f"{text!r} is no box", "give four numbers: x, y, width, height"
         ) from None
     if not (all(map(isfinite, (x, y, width, height))) and width > 0.0 and height > 0.0):
-        raise FloorPlanError(
-            file, "<svg> viewBox", f"{text!r} has no area", "give a positive width and height"
-        )
+        raise FloorPlanError(file, place, f"{text!r} has no area", "give a positive width and height")
     return x, y, width, height
+
+
+def numbers(text: str) -> list[float]:
+    """The numbers of a list, which may follow each other without a blank, as in ``-5-3.5.5``.
+
+    Raises:
+        ValueError: There is something else in it.
+    """
+    if not re.fullmatch(rf"\s*(?:{NUMBER}\s*(?:,\s*)?)*", text):
+        raise ValueError(f"{text!r} is no list of numbers")
+    return [float(number) for number in re.findall(NUMBER, text)]

@@ -33,9 +33,10 @@ def with_floor(scenario: Scenario) -> Scenario:
     path = Path(found.removeprefix("file://"))
     names = [field.name for field in dataclasses.fields(FloorPlanSettings)]
     settings = FloorPlanSettings(**{name: getattr(workspace, name) for name in names})
-    floor = read_floor_plan(path, settings, Inside(start.x, start.y, "start.object")).polygon
-    outer, *holes = (tuple((x, y) for x, y in corners.tolist()) for corners in corners_of(floor))
-    return dataclasses.replace(scenario, workspace=Workspace(outer, tuple(holes)))
+    plan = read_floor_plan(path, settings, Inside(start.x, start.y, "start.object"))
+    outer, *holes = (tuple((x, y) for x, y in corners.tolist()) for corners in corners_of(plan.polygon))
+    notes = tuple(f"{path.name}: {note}" for note in plan.notes)
+    return dataclasses.replace(scenario, workspace=Workspace(outer, tuple(holes), notes=notes))
 
 
 def _check_rings_alone(file: str, workspace: Workspace) -> None:
@@ -44,5 +45,5 @@ def _check_rings_alone(file: str, workspace: Workspace) -> None:
     usual = Workspace()
     for field in dataclasses.fields(Workspace):
         value = getattr(workspace, field.name)
-        if field.name not in ("outer", "holes") and value != getattr(usual, field.name):
+        if field.name not in ("outer", "holes", "notes") and value != getattr(usual, field.name):
             raise ScenarioError(file, f"workspace.{field.name}", value, "nothing without workspace.file")

@@ -47,6 +47,7 @@ class Workspace:
             cells of an occupancy map.
         gap: Lines of a drawing that end this close to another line are joined to it [m].
         unknown_is_free: Whether the unknown cells of a map count as floor.
+        notes: Of a loaded workspace, what the reader of its file left out or assumed, each with the file.
     """
 
     outer: tuple[tuple[float, float], ...] = ()
@@ -58,6 +59,7 @@ class Workspace:
     tolerance: Tolerance | None = None
     gap: Tolerance = 0.01
     unknown_is_free: bool = False
+    notes: tuple[str, ...] = field(default=(), metadata={"in_file": False})
 
     @property
     def polygon(self) -> Polygon:

@@ -122,12 +122,17 @@ REFUSED = {
     "negative": ('<rect width="-5" height="6"/>', "width is negative"),
     "huge": ('<path d="M 0,0 H 1e999 V 6 Z"/>', "not finite"),
     "bad transform": (f'<g transform="turn(3)">{HALL}</g>', "none that SVG knows"),
-    "too few numbers": (f'<g transform="matrix(1 0 0 1)">{HALL}</g>', "<path>: its numbers make no shape"),
+    "too few numbers": (
+        f'<g transform="matrix(1 0 0 1)">{HALL}</g>',
+        "<g>: transform .* is none that SVG knows",
+    ),
     "odd corners": ('<polygon points="0,0 10,0 10"/>', "odd number"),
     "clone of nothing": ('<use href="#gone"/>', "not in the file"),
     "clone of a file": ('<use href="other.svg#a"/>', "not in the file"),
     "clone of itself": ('<g id="a"><use href="#a"/></g>', "levels"),
-    "inner page": (f'<svg viewBox="0 0 1 1">{HALL}</svg>', "ungroup it"),
+    "inner page": (f'<svg viewBox="0 0 1 0">{HALL}</svg>', "has no area"),
+    "inner page without a size": (f'<svg width="-1">{HALL}</svg>', "its size is negative"),
+    "half a path": ('<path d="M 0,0 H"/>', "its numbers make no shape"),
     "nothing": ("<text>hall</text>", "holds no line"),
 }
 

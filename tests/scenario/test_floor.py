@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
+import ast
+import json
+from pathlib import Path
+
 import pytest
 import yaml
 from shapely import box
 
+import coop_drake.cli
 from coop_drake.answers.digest import problem_digest
 from coop_drake.cli.task import read_task
 from coop_drake.errors import FloorPlanError, ScenarioError
 from coop_drake.scenario import dump_scenario, load_scenario
+from tests.support.cli import invoke
 from tests.support.floor_plan_files import room_shades, write_map, write_svg
 from tests.support.scenarios import write_scenario
 
@@ -62,3 +68,36 @@ def test_what_does_not_fit_together_is_refused(tmp_path, workspace, key):
 def test_a_start_outside_the_drawing_is_refused_with_the_drawing(tmp_path):
     with pytest.raises(FloorPlanError, match=r"hall.svg: start.object \(2.5, 2\): it stands in none"):
         load_scenario(named(tmp_path, scale=0.1))
+
+
+def test_every_command_that_reads_the_floor_repeats_the_notes_of_its_reader(tmp_path):
+    scenario, out = named(tmp_path), tmp_path / "out"
+    drawing = (tmp_path / "hall.svg").read_text().replace("</svg>", "<text>Hall</text></svg>")
+    (tmp_path / "hall.svg").write_text(drawing)
+    notes = ["hall.svg: 1 <text> left out"]
+    assert list(load_scenario(scenario).workspace.notes) == notes
+    for words in (
+        ["plan", scenario, "--out", out],
+        ["verify", out / "plan.json", scenario],
+        ["show", scenario, "--out", tmp_path / "room.png"],
+    ):
+        done = invoke(*words)
+        assert (done.exit_code, done.output.count(f"Note: {notes[0]}")) == (0, 1), done.output
+    given = ["--floor-plan", tmp_path / "hall.svg", "--unit", "m"]
+    poses = ["--start", 2.0, 1.5, 0, "--goal", 3, 2, 0, "--length", 0.8]
+    made = invoke("new", "mine", *given, *poses, "--out", tmp_path / "mine", "--json")
+    assert made.exit_code == 0, made.output
+    assert json.loads(made.stdout)["notes"] == notes
+
+
+def test_all_commands_hand_their_reporter_to_the_reader():
+    sources = (Path(coop_drake.cli.__file__).parent).glob("*.py")
+    calls = [
+        node
+        for file in sources
+        for node in ast.walk(ast.parse(file.read_text()))
+        if isinstance(node, ast.Call) and getattr(node.func, "id", "") == "read_task"
+    ]
+    assert len(calls) >= 12
+    for call in calls:
+        assert len(call.args) == 3 or [word.arg for word in call.keywords] == ["reporter"], ast.unparse(call)

@@ -1,0 +1,290 @@
+"""What elements of an SVG drawing look like: attributes, style sheets, inheritance, as CSS combines them."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from coop_drake.errors import FloorPlanError
+from coop_drake.floor_plans.svg_page import SVG, SvgPage, name_of
+
+if TYPE_CHECKING:
+    from xml.etree.ElementTree import Element
+
+INHERITED = {
+    "color": "black",
+    "fill": "black",
+    "fill-opacity": "1",
+    "marker": "none",
+    "marker-end": "none",
+    "marker-mid": "none",
+    "marker-start": "none",
+    "stroke": "none",
+    "stroke-dasharray": "none",
+    "stroke-linecap": "butt",
+    "stroke-linejoin": "miter",
+    "stroke-miterlimit": "4",
+    "stroke-opacity": "1",
+    "stroke-width": "1",
+    "visibility": "visible",
+}
+"""Properties that an element passes on to those inside it, with what they are where nothing says so."""
+
+OWN = {
+    "clip-path": "none",
+    "display": "inline",
+    "filter": "none",
+    "mask": "none",
+    "opacity": "1",
+    "overflow": "hidden",
+    "transform": "none",
+    "vector-effect": "none",
+}
+"""Properties of an element alone; ``overflow`` is read of inner pages, which hide it by default."""
+
+INITIAL = {**INHERITED, **OWN}
+
+_GEOMETRY = ("d", "x", "y", "width", "height", "cx", "cy", "r", "rx", "ry")
+_NOT_READ: tuple[str, ...] = ("all", "clip", "offset", "offset-path", "rotate", "scale", "translate", "zoom")
+_NOT_READ += ("content-visibility",)
+_ORIGIN = ("transform-box", "transform-origin")
+"""Properties that would move, hide or change shapes; they are refused."""
+
+_WITHOUT_EFFECT = ("counter-style", "font-face", "keyframes", "-webkit-keyframes", "page", "property")
+"""Rules of a style sheet that change no shape of a drawing at rest."""
+
+_PSEUDO = {"root", "first-child", "last-child", "only-child", "first-of-type", "last-of-type"}
+_PSEUDO |= {"only-of-type", "empty", "nth-child", "nth-last-child", "nth-of-type", "nth-last-of-type"}
+_PSEUDO |= {"not", "is", "where", "hover", "active", "focus", "focus-visible", "focus-within"}
+"""Pseudo-classes that the library of selectors decides as SVG does; the last ones never hold on paper."""
+
+_XHTML = "{http://www.w3.org/1999/xhtml}"
+_LENGTH = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
+_ARGUMENTS = {"matrix": ((6,), ""), "translate": ((1, 2), "px"), "translatex": ((1,), "px")}
+_ARGUMENTS |= {"translatey": ((1,), "px"), "scale": ((1, 2), ""), "scalex": ((1,), ""), "scaley": ((1,), "")}
+_ARGUMENTS |= {"rotate": ((1,), "deg"), "skewx": ((1,), "deg"), "skewy": ((1,), "deg")}
+"""Functions of the property ``transform``: how many numbers they take, and in which unit."""
+
+_AS_ATTRIBUTE = {"translatex": "translate({0}, 0)", "translatey": "translate(0, {0})"}
+_AS_ATTRIBUTE |= {"scalex": "scale({0}, 1)", "scaley": "scale(1, {0})"}
+_AS_ATTRIBUTE |= {"skewx": "skewX({0})", "skewy": "skewY({0})"}
+"""The same functions in the words of the attribute ``transform``."""
+
+
+class _Said(NamedTuple):
+    """One declaration: a property, its text, and whether it is marked as important."""
+
+    name: str
+    text: str
+    important: bool
+
+
+Values = Mapping[str, str]
+"""What every property of ``INITIAL`` is, as text in lower case, but for addresses."""
+
+
+class Cascade:
+    """All that decides how the elements of a drawing look.
+
+    Presentation attributes count least, then the rules of style sheets by the specificity of their selectors
+    and their order, then the attribute ``style``; what is marked as important goes before all else.
+
+    Args:
+        file: The file, for messages.
+        page: The drawing.
+
+    Raises:
+        FloorPlanError: A style sheet has a rule or a selector that is not read.
+    """
+
+    def __init__(self, file: str, page: SvgPage) -> None:
+        from cssselect2 import ElementWrapper, Matcher
+
+        self._file = file
+        self._matcher, self._rules = Matcher(), 0
+        self._checked: set[Element] = set()
+        self._styles: dict[str, list[_Said]] = {}
+        for element in page.root.iter():
+            if element.tag in ("style", f"{SVG}style", f"{_XHTML}style"):
+                self._read_sheet(element)
+            elif element.tag == f"{_XHTML}link":
+                raise self._refuse(name_of(element), "it names a style sheet in another file")
+        wrapped = ElementWrapper.from_xml_root(page.root).iter_subtree()
+        self._wrapped = {one.etree_element: one for one in wrapped} if self._rules else {}
+
+    def values(self, element: Element, outer: Values) -> Values:
+        """Return what the properties of an element are, inside an element with other ones.
+
+        Raises:
+            FloorPlanError: The element has a style that is not read.
+        """
+        place, said = name_of(element), {key: element.attrib[key] for key in INITIAL if key in element.attrib}
+        own = self._own(element.get("style", ""), place)
+        sheets = [declaration for rule in self._matching(element) for declaration in rule]
+        for important in (False, True):
+            for name, text, is_important in (*sheets, *own):
+                if is_important == important:
+                    said[name] = _transform(text, self._file, place) if name == "transform" else text
+        self._check(element, said, place)
+        return {name: self._computed(name, said, outer, place) for name in INITIAL}
+
+    def check_clone(self, root: Element) -> None:
+        """Refuse a clone of an element if rules select parts of it by what stands around the original.
+
+        Raises:
+            FloorPlanError: It would look different by SVG 1.1 and by SVG 2.
+        """
+        from cssselect2 import ElementWrapper
+
+        if not self._rules or root in self._checked:
+            return
+        self._checked.add(root)
+        for alone in ElementWrapper.from_xml_root(root).iter_subtree():
+            original = self._wrapped[alone.etree_element]
+            if self._matcher.match(alone) != self._matcher.match(original):
+                finding = "a style sheet selects it by what stands around it, and a clone of it is shown"
+                raise self._refuse(name_of(alone.etree_element), finding, "unlink the clone")
+
+    def _refuse(self, place: str, finding: str, remedy: str = "") -> FloorPlanError:
+        remedy = remedy or "save the drawing as plain SVG, with attributes in place of style sheets"
+        return FloorPlanError(self._file, place, finding, remedy)
+
+    def _read_sheet(self, sheet: Element) -> None:
+        import tinycss2
+
+        kind, media = (sheet.get(key, "").strip().lower() for key in ("type", "media"))
+        if kind not in ("", "text/css") or media not in ("", "all", "screen"):
+            raise self._refuse("<style>", f"a style sheet of the kind {kind or media!r} is not read")
+        for rule in tinycss2.parse_stylesheet("".join(sheet.itertext()), True, True):
+            where = f"<style>, line {rule.source_line}"
+            if rule.type == "qualified-rule":
+                self._read_rule(rule, where)
+            elif rule.type == "error":
+                raise self._refuse(where, f"it is no style sheet ({rule.message})")
+            elif rule.lower_at_keyword not in _WITHOUT_EFFECT:
+                raise self._refuse(where, f"@{rule.at_keyword} is not read")
+
+    def _read_rule(self, rule: Any, where: str) -> None:
+        from cssselect2 import SelectorError, compile_selector_list
+        from tinycss2 import serialize
+
+        declarations = self._declarations(rule.content, where)
+        if not declarations:
+            return
+        selector = serialize(rule.prelude).strip()
+        try:
+            unknown = [name for name in _pseudo(rule.prelude) if name not in _PSEUDO]
+            compiled = [] if unknown else compile_selector_list(rule.prelude)
+        except (SelectorError, NotImplementedError) as error:
+            raise self._refuse(where, f"the selector {selector!r} is not read ({error})") from error
+        if unknown:
+            raise self._refuse(where, f"the selector {selector!r} is not read (:{unknown[0]})")
+        for one in compiled:
+            self._rules += 1
+            self._matcher.add_selector(one, declarations)
+
+    def _own(self, style: str, place: str) -> list[_Said]:
+        """Return the declarations of an attribute ``style``; many elements of a drawing have the same."""
+        if style not in self._styles:
+            self._styles[style] = self._declarations(style, f"{place} style")
+        return self._styles[style]
+
+    def _declarations(self, content: Any, where: str) -> list[_Said]:
+        """Return the declarations of a rule or of an attribute ``style`` that matter for what is drawn."""
+        import tinycss2
+
+        said = []
+        for one in tinycss2.parse_blocks_contents(content, skip_comments=True, skip_whitespace=True):
+            if one.type != "declaration":
+                finding = getattr(one, "message", "rules inside rules are not read")
+                raise self._refuse(where, f"its style is not read ({finding})")
+            text = tinycss2.serialize([t for t in one.value if t.type != "comment"]).strip()
+            if one.lower_name in (*INITIAL, *_NOT_READ, *_ORIGIN, *_GEOMETRY):
+                if re.search(r"\b(?:var|env|attr)\(", text):
+                    raise self._refuse(where, f"{one.lower_name}: {text} is not read")
+                said.append(_Said(one.lower_name, text, one.important))
+            elif re.sub(r"^-\w+-", "", one.lower_name) in ("clip-path", "filter", "mask", "transform"):
+                raise self._refuse(where, f"{one.lower_name} is not read")
+        return said
+
+    def _matching(self, element: Element) -> Iterator[list[_Said]]:
+        """Yield the declarations of the rules that select an element, those that count most at the end."""
+        if self._rules:
+            for _, _, pseudo, declarations in self._matcher.match(self._wrapped[element]):
+                if pseudo is None:
+                    yield declarations
+
+    def _check(self, element: Element, said: dict[str, str], place: str) -> None:
+        """Refuse properties that move or change shapes, and that no attribute of SVG 1.1 has."""
+        is_page = element.tag in ("svg", f"{SVG}svg")  # Its size on a screen is not that of the drawing.
+        turned = said.get("transform", "none").strip() not in ("", "none")
+        for name in (*_NOT_READ, *(() if is_page else _GEOMETRY), *(_ORIGIN if turned else ())):
+            text = said.get(name, element.get(name, "none") if name in _ORIGIN else "none")
+            if text.strip().lower() not in ("none", "auto", "normal", "visible", "1"):
+                raise self._refuse(place, f"the property {name}: {text} is not read")
+
+    def _computed(self, name: str, said: Mapping[str, str], outer: Values, place: str) -> str:
+        text = said.get(name, "unset").strip()
+        text = text if name == "transform" or "url(" in text.lower() else text.lower()
+        if text.startswith("revert"):
+            raise self._refuse(place, f"{name}: {text} is not read")
+        if text == "inherit" or (text == "unset" and name in INHERITED):
+            return outer[name]
+        return INITIAL[name] if text in ("initial", "unset", "") else text
+
+
+def paints(values: Values, kind: str) -> bool:
+    """Whether a shape's ``fill`` or ``stroke`` is seen; what is not known to be transparent is."""
+    paint = values[kind]
+    if paint == "none" or opacity(values[f"{kind}-opacity"]) == 0.0:
+        return False
+    return _opacity_of_colour(values["color"] if paint == "currentcolor" else paint) > 0.0
+
+
+@lru_cache(maxsize=1000)
+def _opacity_of_colour(paint: str) -> float:
+    from tinycss2.color4 import parse_color
+
+    return float(getattr(parse_color(paint), "alpha", 1.0))
+
+
+def opacity(text: str) -> float:
+    """Return an opacity from 0 to 1; a text that is none does not count, and is 1."""
+    match = re.fullmatch(rf"({_LENGTH})(%?)", text)
+    value = float(match[1]) / (100.0 if match[2] else 1.0) if match else 1.0
+    return min(max(value, 0.0), 1.0)
+
+
+def _pseudo(tokens: Any) -> Iterator[str]:
+    """Yield the names of the pseudo-classes of a selector, those inside functions included."""
+    for before, token in zip([None, *tokens], tokens, strict=False):
+        if getattr(before, "value", None) == ":" and token.type in ("ident", "function"):
+            yield token.lower_value if token.type == "ident" else token.lower_name
+        for inside in (getattr(token, "arguments", None), getattr(token, "content", None)):
+            yield from _pseudo(inside or [])
+
+
+def _transform(text: str, file: str, place: str) -> str:
+    """Return the property ``transform``, whose numbers have units, in the words of the attribute.
+
+    Raises:
+        FloorPlanError: It has a function or a unit that is not read.
+    """
+    if text.strip().lower() in ("none", "inherit", "initial", "unset"):
+        return text
+    parts = []
+    for name, inside in re.findall(r"([A-Za-z]+)\(([^()]*)\)", text):
+        counts, unit = _ARGUMENTS.get(name.lower(), ((), ""))
+        numbers = [one for one in re.split(r"\s*,\s*", inside.strip()) if one]
+        known = [re.fullmatch(rf"({_LENGTH}){unit}|[-+]?0", one, re.IGNORECASE) for one in numbers]
+        if len(numbers) not in counts or not all(known):
+            break
+        values = [match[1] or "0" for match in known if match]
+        joined = f"{name.lower()}({', '.join(values)})"
+        parts.append(_AS_ATTRIBUTE.get(name.lower(), joined).format(*values))
+    if re.sub(r"[A-Za-z]+\([^()]*\)|\s", "", text) or len(parts) != text.count("("):
+        remedy = "apply it in the drawing program, or state it as the attribute transform"
+        raise FloorPlanError(file, place, f"the property transform: {text} is not read", remedy)
+    return " ".join(parts)
