@@ -14,12 +14,15 @@ class Check:
         count: How many times it was checked.
         tightest: The value that came closest to a refusal, None where there is none.
         unit: Its unit, with what it measures.
+        arrays: Names of the log's arrays that were computed again, or are tied to others by equations: no
+            number of them can be altered alone.
     """
 
     name: str
     count: int
     tightest: float | None = None
     unit: str = ""
+    arrays: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -8,9 +8,21 @@ import pytest
 from coop_drake.compiled_loop import simulate_fused
 from coop_drake.errors import RefusalError
 from coop_drake.plant import planning_problem, run_setup
-from coop_drake.verification.runs import verify_log
+from coop_drake.scenario import ActuatorLimits, Deployment, Measurements, Messages
+from coop_drake.simulation import build_maps
+from coop_drake.verification.runs import Rows, verify_log
+from coop_drake.verification.runs.nominal_reports import check_nominal_reports
 from tests.support.run_oracle import RunOracle
 from tests.support.small_loop import small_maps, small_problem
+from tests.support.tubes import WITH_AXES, tubed_problem
+
+LOOSE = {"exact": False, "rigid": False, "mechanics": False, "one_clock": False, "alike": False}
+"""A team that departs from the ideal one in every way that leaves a check aside."""
+
+ADVICE = (
+    "is neither compared nor named as read from the log. Let a check compute it again and add it to that "
+    "check's `arrays`; what is in no check's `arrays` is named by `verify`"
+)
 
 STATES = {"times", "object_pose", "joints", "base_poses", "accelerations", "base_wrenches", "joint_torques"}
 """Arrays of which no altered number is accepted."""
@@ -45,9 +57,9 @@ def altered(log, name, generator):
     return replace(log, **{name: values}), int(at[0])
 
 
-def refused(log, against):
+def refused(log, against, braked=False):
     try:
-        verify_log(log, *against)
+        verify_log(log, *against, braked=braked)
     except RefusalError as error:
         return error
     return None
@@ -56,7 +68,7 @@ def refused(log, against):
 def test_a_run_is_accepted_as_it_was(case):
     log, against, oracle = case
     verified = verify_log(log, *against)
-    assert (verified.answer, len(verified.checks)) == ("arrived", 21)
+    assert (verified.answer, len(verified.checks)) == ("arrived", 22)
     assert [name for row in range(0, len(log.times), 20) for name in oracle.false_at(log, row)] == []
 
 
@@ -74,6 +86,69 @@ def test_an_altered_number_is_refused_or_makes_nothing_false(case):
             else:
                 assert "t = " in error.finding or "[" in error.where, name
     assert accepted.isdisjoint(STATES)
+
+
+@pytest.fixture(scope="module")
+def budgeted():
+    """A run of a noisy team under a plan with a budget, and all that it is checked against."""
+    scenario, plan = tubed_problem(WITH_AXES)
+    deployment = Deployment(
+        control_rate=plan.budget.control_rate,
+        measurements=Measurements(0.0003, 0.0002, 0.005, delay=plan.budget.delay),
+        actuators=ActuatorLimits(lag=plan.budget.lag),
+        messages=Messages(loss=0.2),
+    )
+    scenario = replace(scenario, deployment=deployment)
+    log = simulate_fused(scenario, plan, build_maps(plan))
+    return log, (plan, planning_problem(scenario), run_setup(scenario))
+
+
+@pytest.fixture(params=["deployed", "loose", "braked", "budget"])
+def claimed(request, case, budgeted):
+    """Logs, what they are checked against, and whether all drives braked."""
+    log, (plan, problem, setup), _ = case
+    if request.param == "budget":
+        return *budgeted, False
+    loose = LOOSE if request.param == "loose" else {"exact": False}
+    return log, (plan, problem, replace(setup, **loose)), request.param == "braked"
+
+
+def test_every_array_of_a_log_is_compared_with_something_or_named_as_read(claimed):
+    log, against, braked = claimed
+    verified = verify_log(log, *against, braked=braked)
+    named = (
+        verified.not_proved.partition("which are read as they are logged: ")[2].partition(";")[0].split(", ")
+    )
+    for number, name in enumerate(arrays(log)):
+        values = getattr(log, name)
+        at = ((7 + 13 * number) % (len(values) - 2) + 1, *[size - 1 for size in values.shape[1:]])
+        other = values.copy()
+        other[at] += 1 if values.dtype.kind == "i" else 0.02 + 0.1 * np.ptp(values[(slice(None), *at[1:])])
+        error = refused(replace(log, **{name: other}), against, braked=braked)
+        assert error is not None or name in named, f"{name} {ADVICE}"
+
+
+def test_what_is_named_as_read_from_a_log(case, budgeted):
+    """Of an ideal team's log all is compared, of others less."""
+    log, (plan, problem, setup), _ = case
+    said = [verify_log(log, plan, problem, replace(setup, exact=exact)).not_proved for exact in (True, False)]
+    assert "as they are logged" not in said[0]
+    for name in ("energy_margin", "ready_margins", "governor_position", "commanded_wrenches"):
+        assert name in said[1]
+    log, against = budgeted
+    said = verify_log(log, *against).not_proved
+    assert "energy_margin" not in said
+    assert "ready_margins" in said
+
+
+def test_a_report_that_the_nominal_motions_do_not_give_is_refused(budgeted):
+    log, (plan, problem, _) = budgeted
+    reports = log.ready_margins.copy()
+    reports[len(reports) // 10] = 0.01
+    robots = [joint.robot for joint in problem.tree.joints]
+    assert len(check_nominal_reports(Rows(log, plan), robots)) == 2
+    with pytest.raises(RefusalError, match="the nominal motions give"):
+        check_nominal_reports(Rows(replace(log, ready_margins=reports), plan), robots)
 
 
 @pytest.mark.parametrize(

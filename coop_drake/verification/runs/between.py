@@ -80,4 +80,5 @@ def check_motion(rows: Rows, between: Between) -> Check:
         rows.require(values <= bounds, name, text, values, bounds, first=1)
     tightest = float((residual / allowed).max(initial=0.0))
     name = "rates are derivatives of positions, accelerations of rates"
-    return Check(name, 2 * z.size, tightest, "of the bound")
+    arrays = "times", "object_pose", "object_twist", "joints", "joint_rates"
+    return Check(name, 2 * z.size, tightest, "of the bound", arrays)

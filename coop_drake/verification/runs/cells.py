@@ -51,9 +51,13 @@ def check_cells(rows: Rows, between: Between) -> tuple[Check, Check]:
     )
     count = 2 * len(log.times)
     return (
-        Check(place, count, least, "m, least"),
+        Check(place, count, least, "m, least", ("cell_clearance",)),
         Check(
-            f"{interval}, between rows, too", count * (rows.z.shape[1] - 2), least_slice, "rad or m, least"
+            f"{interval}, between rows, too",
+            count * (rows.z.shape[1] - 2),
+            least_slice,
+            "rad or m, least",
+            ("slice_margin",),
         ),
     )
 

@@ -86,7 +86,13 @@ def check_clearances(
     least_logged = float(min(values.min() for values in smallest.values()))
     count, between_rows = len(distances), "nor did one between two rows"
     return (
-        Check("no body met a wall or another body", count * len(rows.z), least_logged, "m, smallest"),
+        Check(
+            "no body met a wall or another body",
+            count * len(rows.z),
+            least_logged,
+            "m, smallest",
+            tuple(smallest),
+        ),
         Check(between_rows, count * len(rows.steps), least, "m, a lower bound"),
     )
 

@@ -74,7 +74,13 @@ def check_funnels(rows: Rows, between: Between) -> tuple[Check, Check]:
         rows.require_same("funnel_lower", lower, ROUNDING), rows.require_same("funnel_upper", upper, ROUNDING)
     )
     return (
-        Check("funnels are those of the plan", 2 * axes.size, largest, "rad or m, largest difference"),
+        Check(
+            "funnels are those of the plan",
+            2 * axes.size,
+            largest,
+            "rad or m, largest difference",
+            ("funnel_lower", "funnel_upper", "clock_lag"),
+        ),
         Check("every axis lay in them, between rows, too", 2 * axes.size, least, "rad or m, least"),
     )
 
@@ -85,7 +91,8 @@ def check_stated_funnels(rows: Rows) -> Check:
     margins = np.minimum(axes - log.funnel_lower, log.funnel_upper - axes)
     rows.require(margins > 0.0, "angle, joints", "lies outside the stated funnel")
     rows.require_same("funnel_margin", margins.min(axis=1), ROUNDING)
-    return Check("every axis lay in the stated funnels", axes.size, float(margins.min()), "rad or m, least")
+    name, least = "every axis lay in the stated funnels", float(margins.min())
+    return Check(name, axes.size, least, "rad or m, least", ("funnel_margin",))
 
 
 def entry_energies(plan: Plan, cell: int, axes: FloatArray, rates: FloatArray) -> FloatArray:

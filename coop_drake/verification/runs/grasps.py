@@ -46,7 +46,8 @@ def check_grasps(rows: Rows, problem: PlanningProblem, setup: RunSetup) -> Check
         rows.require(away <= allowed, "base_poses, object_pose, joints", text, away)
         largest = max(largest, float(away.max()))
     name = "bases stand where the grasps and the joints put them"
-    return Check(name, len(log.times), largest, "m or rad, largest")
+    arrays = ("base_poses", "grasp_error") if setup.rigid else ("base_poses",)
+    return Check(name, len(log.times), largest, "m or rad, largest", arrays)
 
 
 def check_wrenches(rows: Rows, setup: RunSetup) -> Check:
@@ -64,9 +65,10 @@ def check_wrenches(rows: Rows, setup: RunSetup) -> Check:
     for name, limit in zip(("wrench_error", "acceleration_error"), largest, strict=True):
         stated = getattr(log, name)
         rows.require((stated >= 0.0) & (stated <= limit), name, f"is {{:.3g}}; expected 0 to {limit}", stated)
-    return Check(
-        "wrenches add up to the object's", commanded.size, float(error.max()), "N or N m, largest error"
-    )
+    ideal = ("commanded_wrenches", "acceleration_error") if setup.exact else ()
+    arrays = ("object_wrench", "wrench_error", *ideal)
+    name = "wrenches add up to the object's"
+    return Check(name, commanded.size, float(error.max()), "N or N m, largest error", arrays)
 
 
 def about_object(rows: Rows, setup: RunSetup, wrenches: FloatArray, centre: FloatArray) -> FloatArray:

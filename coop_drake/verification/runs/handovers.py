@@ -45,7 +45,11 @@ def check_handovers(rows: Rows, *, exact: bool) -> tuple[Check, Check]:
     shares = [float(_share(rows, k, i).max()) for k, i in enumerate(rows.entries, 1)]
     used = "share of the energy, or of the departure from rest, that the axes may have when a cell is entered"
     return (
-        Check("cells were entered one by one, each when all robots were ready", len(shares)),
+        Check(
+            "cells were entered one by one, each when all robots were ready",
+            len(shares),
+            arrays=("cell_index", "transition_start"),
+        ),
         Check(used, len(shares), max(shares, default=None), "of the bound, largest"),
     )
 

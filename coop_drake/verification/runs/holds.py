@@ -21,12 +21,15 @@ ROUNDING = 1e-6
 """Share of a step by which a clock that stands still may go on, or one that runs may lag [-]."""
 
 
-def check_clock(rows: Rows, *, one_hold: bool) -> Check:
+def check_clock(rows: Rows, *, one_hold: bool, never_held: bool = False) -> Check:
     """Check that the stated lag grows with time while the team is held, and not where it is free for long.
 
     Where robots do not hear of a hold at once, the first one's lag is only no more than the time.
     """
     log, h = rows.log, rows.steps
+    if never_held:
+        for name in ("held", "clock_lag"):
+            rows.require_same(name, np.zeros(len(log.times)), 0.0)
     rows.require((log.held == 0.0) | (log.held == 1.0), "held", "is {}; expected 0 or 1", log.held)
     rows.require_same("clock_lag", np.zeros(1), 0.0)
     entered = np.diff(log.cell_index) > 0
@@ -41,7 +44,8 @@ def check_clock(rows: Rows, *, one_hold: bool) -> Check:
     rows.require(~long_held | (grown >= h - rounding), "clock_lag", text + " of a hold", grown, h, first=1)
     count = int((np.diff(log.held, prepend=0.0) > 0.0).sum())
     lost = float(np.where(entered, log.clock_lag[:-1], 0.0).sum() + log.clock_lag[-1])
-    return Check("the funnels' clock stands still where the team is held", count, lost, "s lost")
+    arrays = ("held", "clock_lag") if never_held else ()
+    return Check("the funnels' clock stands still where the team is held", count, lost, "s lost", arrays)
 
 
 def paused(rows: Rows) -> NDArray[np.bool_]:

@@ -42,7 +42,8 @@ def check_mechanics(rows: Rows, problem: PlanningProblem, setup: RunSetup) -> Ch
     for joint in tree.joints:
         _check_joint(rows, tree, setup, joint, needs)
     efforts = log.base_wrenches.size + log.joint_torques.size
-    return Check("efforts, wrenches at the grasps and accelerations obey mechanics", efforts)
+    arrays = "accelerations", "measured_wrenches", "base_wrenches", "joint_torques"
+    return Check("efforts, wrenches at the grasps and accelerations obey mechanics", efforts, arrays=arrays)
 
 
 def _check_joint(rows: Rows, tree: ComponentTree, setup: RunSetup, joint: TreeJoint, needs: Needs) -> None:

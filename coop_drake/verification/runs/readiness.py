@@ -54,7 +54,26 @@ def check_energy_margin(rows: Rows) -> Check:
     rows.require_same("energy_margin", margins, SAME + STEP * speeds)
     rows.require(log.energy_margin >= 0.0, "energy_margin", "is {:.3g}, negative", log.energy_margin)
     rows.require_same("governor_spread", np.zeros(len(log.times)), SAME)
-    return Check("Delta E is right and never negative", len(log.times), float(margins.min()), "m²/s², least")
+    name, least = "Delta E is right and never negative", float(margins.min())
+    return Check(name, len(log.times), least, "m²/s², least", ("energy_margin", "governor_spread"))
+
+
+def check_reference(rows: Rows) -> Check:
+    """Check that p_G is where the object's acceleration, which mechanics ties to forces, says by (14)."""
+    log, largest = rows.log, 0.0
+    for k in range(len(rows.plan.cells)):
+        members = np.flatnonzero(log.cell_index == k)
+        times = log.times[members] - log.transition_start[members]
+        stiffness, damping = (gain[:, None] for gain in _governed(rows.plan, k, times))
+        velocity, acceleration = log.object_twist[members, :2], log.accelerations[members, :2]
+        expected = log.object_pose[members, :2] + (acceleration + damping * velocity) / stiffness
+        away = np.abs(log.governor_position[members] - expected)
+        good = np.ones((len(log.times), 2), dtype=np.bool_)
+        good[members] = away <= SAME
+        rows.require(good, "governor_position", f"is not where the acceleration in cell {k} says")
+        largest = max(largest, float(away.max(initial=0.0)))
+    name = "p_G is where accelerations say"
+    return Check(name, 2 * len(log.times), largest, "m, largest difference", ("governor_position",))
 
 
 def check_reports(rows: Rows, problem: PlanningProblem) -> Check:
@@ -74,7 +93,8 @@ def check_reports(rows: Rows, problem: PlanningProblem) -> Check:
     of_robots = np.column_stack([of_axes[:, axes].min(axis=1) for axes in own])
     margins = np.minimum(of_object[:, None], of_robots)
     largest = rows.require_same("ready_margins", margins, tolerances[:, None])
-    return Check("reports are those of the states", margins.size, largest, "largest difference")
+    name = "reports are those of the states"
+    return Check(name, margins.size, largest, "largest difference", ("ready_margins",))
 
 
 def _leaving(rows: Rows, members: NDArray[np.bool_], cell: int) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -91,7 +111,7 @@ def _leaving(rows: Rows, members: NDArray[np.bool_], cell: int) -> tuple[FloatAr
         duration = max(duration, rest.after)
     at_entry = np.zeros(int(members.sum()))
     margin = _energy_margin(rows, members, cell + 1, at_entry)
-    floor = 0.5 * _stiffness(plan, cell + 1, at_entry) * (0.5 * plan.transitions[cell].inradius) ** 2
+    floor = 0.5 * _governed(plan, cell + 1, at_entry)[0] * (0.5 * plan.transitions[cell].inradius) ** 2
     of_object = (margin - floor) / np.maximum(np.abs(margin), floor)
     time = log.times - log.transition_start
     if duration > 0.0:
@@ -139,12 +159,12 @@ def _inside_goal(rows: Rows, members: NDArray[np.bool_], cell: int) -> FloatArra
     return inside
 
 
-def _stiffness(plan: Plan, cell: int, times: FloatArray) -> FloatArray:
-    """K at some times since a cell was entered, shape (m,) [1/s^2]."""
+def _governed(plan: Plan, cell: int, times: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """K [1/s^2] and zeta [1/s] at some times since a cell was entered, shape (m,) each."""
     gains, before = (plan.transitions[k].gains for k in (cell, max(cell - 1, 0)))
     left = quintic(CLOSED * times / gains.hand_over_time) if gains.hand_over_time > 0.0 else 0.0 * times
     stiffness: FloatArray = gains.stiffness * (before.stiffness / gains.stiffness) ** left
-    return stiffness
+    return stiffness, gains.damping * (before.damping / gains.damping) ** left
 
 
 def _energy_margin(rows: Rows, members: NDArray[np.bool_], cell: int, times: FloatArray) -> FloatArray:
@@ -152,7 +172,7 @@ def _energy_margin(rows: Rows, members: NDArray[np.bool_], cell: int, times: Flo
 
     Velocities are rounded as the robots round them.
     """
-    log, stiffness = rows.log, _stiffness(rows.plan, cell, times)
+    log, stiffness = rows.log, _governed(rows.plan, cell, times)[0]
     reference = log.governor_position[members]
     clearance = signed_distances(rows.plan.cells[cell].tidied, reference)
     velocity = np.rint(log.object_twist[members, :2] / STEP) * STEP

@@ -37,8 +37,10 @@ class RunSetup:
         rigid: Whether grasps are exactly rigid.
         mechanics: Whether grasps are rigid and nothing but actuators, joint damping and grasps acts on the
             bodies, so that the equations of motion hold to rounding.
+        can_be_held: Whether the scenario knows holds.
         one_hold: Whether all robots hear at once that they are held, and not.
         one_clock: Whether all robots have the same time since a cell was entered.
+        alike: Whether they also compute at the same instants, so that all have the same nominal motions.
         grasps: Every robot's grasp in L, shape (N, 2) [m].
         bodies: Mass properties of all bodies.
         joint_damping: Of every joint, shape (n,) [N m s or N s/m].
@@ -51,8 +53,10 @@ class RunSetup:
     exact: bool
     rigid: bool
     mechanics: bool
+    can_be_held: bool
     one_hold: bool
     one_clock: bool
+    alike: bool
     grasps: FloatArray
     bodies: tuple[BodyMass, ...]
     joint_damping: FloatArray

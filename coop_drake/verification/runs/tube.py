@@ -130,7 +130,7 @@ def stated_departures(rows: Rows) -> list[Departure]:
     if plan.budget is None or plan.tube is None:
         return []
     every, names = np.arange(len(log.times)), ("the object's angle", *log.joint_names)
-    sample, late, first = _samples(rows)
+    sample, late, first = samples_of(rows)
     nominal = _nominal(rows, log.governor_position[first], first, sample, late)
     z, rates = log.object_pose[:, :2], log.object_twist[:, :2]
     off = [np.hypot(*(seen - led).T)[:, None] for seen, led in zip((z, rates), nominal, strict=True)]
@@ -169,7 +169,7 @@ def stated_departures(rows: Rows) -> list[Departure]:
             Departure(statement, "angle, joints", names, nearness, shares, np.ones(least.shape), every)
         )
     if not log.held.any():
-        axes = _nominal_axes(rows, first)
+        axes = nominal_axes(rows, first)
         of_rates = tuple(f"the rate of {name}" for name in names)
         for statement, name, array, seen, led, what in (
             (
@@ -204,7 +204,7 @@ def _of_cells(plan: Plan, cells: IntArray, name: str) -> FloatArray:
     return np.asarray(fields)[cells]
 
 
-def _samples(rows: Rows) -> tuple[IntArray, FloatArray, IntArray]:
+def samples_of(rows: Rows) -> tuple[IntArray, FloatArray, IntArray]:
     """Return of every row the sample before it and the time since then [s], and the samples' first rows."""
     times, period = rows.log.times, rows.plan.budget.period if rows.plan.budget else nan
     sample = np.floor(times / period + SAME_TIME / period).astype(np.int64)
@@ -219,7 +219,7 @@ def _check_nominal(rows: Rows, speed: float) -> None:
     """Check p_G at every sample, and that it led the nominal motion through its regions."""
     log, plan = rows.log, rows.plan
     assert plan.budget is not None  # checked by the caller
-    sample, late, first = _samples(rows)
+    sample, late, first = samples_of(rows)
     p_G = log.governor_position[first]
     steps = np.hypot(*np.diff(p_G, axis=0, prepend=p_G[:1]).T)
     text = "moved by {:.6g} m in a period, beyond the plan's largest speed"
@@ -236,15 +236,7 @@ def _check_nominal(rows: Rows, speed: float) -> None:
 
 def _nominal(rows: Rows, p_G: FloatArray, first: IntArray, sample: IntArray, late: FloatArray) -> FloatArray:
     """Return the nominal position and velocity in every row, shape (2, T, 2) [m, m/s]."""
-    plan, gains = rows.plan, rows.plan.transitions[0].gains
-    assert plan.budget is not None  # checked by the caller
-    flow = oscillator(gains.stiffness, gains.damping, plan.budget.period)
-    states = np.empty((len(first), 2, 2))  # sample; p^ - p_G and p^'; coordinates
-    state = np.array([plan.start[:2] - p_G[0], np.zeros(2)])
-    for i in range(len(first)):
-        states[i] = state
-        state = flow @ state
-        state[0] -= p_G[min(i + 1, len(first) - 1)] - p_G[i]
+    gains, states = rows.plan.transitions[0].gains, position_states(rows, p_G)
     nominal = np.empty((2, len(sample), 2))
     at = np.searchsorted(sample[first], sample)
     for row, (i, time) in enumerate(zip(at, late, strict=True)):
@@ -255,7 +247,20 @@ def _nominal(rows: Rows, p_G: FloatArray, first: IntArray, sample: IntArray, lat
     return nominal
 
 
-def _nominal_axes(rows: Rows, first: IntArray) -> FloatArray:
+def position_states(rows: Rows, p_G: FloatArray) -> FloatArray:
+    """Return p^ - p_G and p^' at every sample, shape (samples, 2, 2), the coordinates last [m, m/s]."""
+    plan, gains = rows.plan, rows.plan.transitions[0].gains
+    assert plan.budget is not None  # checked by the caller
+    flow = oscillator(gains.stiffness, gains.damping, plan.budget.period)
+    states, state = np.empty((len(p_G), 2, 2)), np.array([plan.start[:2] - p_G[0], np.zeros(2)])
+    for i in range(len(p_G)):
+        states[i] = state
+        state = flow @ state
+        state[0] -= p_G[min(i + 1, len(p_G) - 1)] - p_G[i]
+    return states
+
+
+def nominal_axes(rows: Rows, first: IntArray) -> FloatArray:
     """Return nominal axes and their rates at all samples, shape (samples, 2, 1 + n) [rad or m, and per s].
 
     Args:

@@ -13,12 +13,18 @@ the array, the index and the time:
 7. Bases, wrenches and efforts go with the motion: ``grasps``, ``mechanics``.
 8. Bases and joints kept their limits: ``speeds.check_run_speeds``, ``speeds.check_run_efforts``.
 9. Nothing touched: ``clearances.check_clearances``.
-10. Nothing departed by more than a budget of the plan states: ``tube.check_budget_used``.
+10. Nothing departed by more than a budget of the plan states: ``tube.check_budget_used``. Delta E and reports
+    are those of its nominal motions: ``nominal_reports``.
 
-Of a run in which all drives braked, statements 5, 6 and 10 are left aside: they are about the plan's laws.
+The arrays that no check computes again, or ties to others, are named. Of a run in which all drives braked, statements 5, 6 and 10 are left aside: they are about the plan's laws.
 """
 
 from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import fields
+
+import numpy as np
 
 from coop_drake.answers.log import SimulationLog
 from coop_drake.answers.plan import Plan
@@ -36,7 +42,8 @@ from coop_drake.verification.runs.grasps import check_grasps, check_wrenches
 from coop_drake.verification.runs.handovers import check_handovers
 from coop_drake.verification.runs.holds import check_clock
 from coop_drake.verification.runs.mechanics import check_mechanics
-from coop_drake.verification.runs.readiness import check_energy_margin, check_reports
+from coop_drake.verification.runs.nominal_reports import check_nominal_reports
+from coop_drake.verification.runs.readiness import check_energy_margin, check_reference, check_reports
 from coop_drake.verification.runs.rows import Rows, check_complete
 from coop_drake.verification.runs.setup import RunSetup
 from coop_drake.verification.runs.speeds import check_run_efforts, check_run_speeds
@@ -84,7 +91,10 @@ def verify_log(
     checks += [] if kept is None else [kept]
     checks += check_run_efforts(rows, problem)
     checks += check_clearances(rows, between, problem, progress)
-    checks += [] if braked else check_budget_used(rows)
+    if not braked:
+        checks += check_budget_used(rows)
+        robots = [joint.robot for joint in problem.tree.joints]
+        checks += check_nominal_reports(rows, robots) if setup.alike else []
     stayed = "" if braked else ", and the team stayed in cells and funnels"
     aside = _left_aside(setup, braked=braked)
     if log.held.any() and plan.budget is not None and plan.budget.axes and not braked:
@@ -94,18 +104,33 @@ def verify_log(
         f"run of {log.times[-1]:.2f} s in {len(log.times)} rows",
         tuple(checks),
         f"in this run nothing touched{stayed}, between the rows, too",
-        "; ".join([*aside, "other runs; that the robots are as in their models"]),
+        "; ".join(
+            [
+                *aside,
+                *_taken_as_logged(log, checks),
+                "other runs; that the robots are as in their models",
+            ]
+        ),
     )
+
+
+def _taken_as_logged(log: SimulationLog, checks: Sequence[Check]) -> list[str]:
+    """Name the arrays of which numbers can be altered without being refused; nothing where there is none."""
+    tied = {name for check in checks for name in check.arrays}
+    arrays = [field.name for field in fields(log) if isinstance(getattr(log, field.name), np.ndarray)]
+    free = [name for name in arrays if name not in tied]
+    return [f"these arrays, which are read as they are logged: {', '.join(free)}"] if free else []
 
 
 def _check_laws(rows: Rows, between: Between, problem: PlanningProblem, setup: RunSetup) -> list[Check]:
     """Check what a run states about the plan's laws: cells, funnels, reports and entries into cells."""
     checks = [*check_cells(rows, between), check_stated_funnels(rows)]
-    checks.append(check_clock(rows, one_hold=setup.one_hold))
+    never_held = not setup.can_be_held and rows.plan.budget is None
+    checks.append(check_clock(rows, one_hold=setup.one_hold, never_held=never_held))
     if setup.one_clock:
         checks += check_funnels(rows, between)
     if setup.exact:
-        checks += [check_energy_margin(rows), check_reports(rows, problem)]
+        checks += [check_energy_margin(rows), check_reference(rows), check_reports(rows, problem)]
     return [*checks, *check_handovers(rows, exact=setup.exact)]
 
 
@@ -116,15 +141,7 @@ def _left_aside(setup: RunSetup, *, braked: bool) -> list[str]:
             "that the team followed the plan: its cells, funnels, reports and budget, for the drives braked"
         )
         return [laws] if setup.mechanics else [laws, _FORCES]
-    departures = (
-        (setup.exact, "energy margins and reports as the robots computed them, with delays and noise"),
-        (
-            setup.one_clock,
-            "that the stated funnels follow from the plan, for every robot has a clock of its own",
-        ),
-        (setup.mechanics, _FORCES),
-    )
-    return [aside for checked, aside in departures if not checked]
+    return [] if setup.mechanics else [_FORCES]
 
 
 def check_belonging(rows: Rows, problem: PlanningProblem, setup: RunSetup) -> Check:
