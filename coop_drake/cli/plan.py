@@ -88,6 +88,10 @@ def answer_to(
         from coop_drake.plant.budgets import budget_of  # Drake, which other plans do without
 
         tolerated = budget_of(budget, task.scenario, task.problem)
+        required = task.scenario.deployment.budget
+        if budget not in (None, required) and required != "none":
+            said = f"--budget {budget}: the scenario requires the budget {required}"
+            reporter.say(f"[yellow]{escape(said)}; `verify` will refuse the plan[/]")
     with reporter.stage("planning", "planning", cpu=True) as progress:
         gain_set = task.scenario.gain_sets[name]
         work = partial(

@@ -50,9 +50,9 @@ def verify_plan(
     """
     same = check_problem(plan, problem)
     exact = _exactly(problem, plan_document(plan), progress)
-    if plan.refused_by:
-        return _verified_way(plan, (same, *exact, check_refusals(plan, problem)))
     checks = [same, *exact, check_gains(plan, gain_sets)]
+    if plan.refused_by:
+        return _verified_way(plan, (*checks, *_of_way(plan, problem), check_refusals(plan, problem)))
     origin = None if budgets is None else check_origin(plan.budget, budgets)
     checks += [
         further
@@ -70,6 +70,22 @@ def verify_plan(
         "no body touches a wall or another body in any state of the cells, which lead from start to goal",
         f"{_unproved_of_control(plan)}; the estimated times; that the robots are as in their models",
     )
+
+
+def _of_way(plan: Plan, problem: PlanningProblem) -> list[Check]:
+    """Check what a way states about speeds; it has no budget, and limits of acceleration are left out."""
+    if plan.budget is not None:
+        raise RefusalError("budget", "is stated, but a way that limits refuse has none")
+    for k, transition in enumerate(plan.transitions):
+        if transition.gains.acceleration_limit is not None:
+            where = f"transitions[{k}].gains.acceleration_limit"
+            raise RefusalError(where, "is stated, but a way is made without such limits")
+    found = (
+        check_speeds(plan, problem),
+        check_budget(plan),
+        *check_position(plan, problem.position_tolerance),
+    )
+    return [check for check in found if check is not None]
 
 
 def _verified_way(plan: Plan, checks: tuple[Check, ...]) -> Verified:

@@ -97,6 +97,12 @@ def test_a_budget_of_a_file_is_said_not_to_be_the_scenarios(tmp_path):
     assert "the budget is not the scenario's: deployment.robots is" in said
 
 
+def test_another_budget_than_the_required_one_is_planned_for_with_a_warning(tmp_path):
+    file = scenario(tmp_path, budget="all")
+    said = " ".join(invoke("plan", file, "--budget", "position", "--out", tmp_path / "out").output.split())
+    assert "--budget position: the scenario requires the budget all; `verify` will refuse the plan" in said
+
+
 def test_a_required_budget_that_does_not_hold_is_a_negative_answer(tmp_path):
     file = scenario(tmp_path, budget="position", measurements={"position_noise": 0.02})
     result = invoke("plan", file, "--out", tmp_path / "out")

@@ -24,6 +24,7 @@ from coop_drake.typed_data import convert_class
 from coop_drake.verification import exact, verify_plan
 from coop_drake.verification.budgets import check_origin
 from coop_drake.verification.gains import check_ages
+from tests.support.certificates import GAINS, room_with_pillar
 from tests.support.last_cells import last_cells
 from tests.support.scenarios import MODELS
 
@@ -131,10 +132,15 @@ def case(name, required):
     budget = budget_of(None, scenario, problem)
     found = make(problem, gains["scheduled"], gain_set_name="scheduled", budget=budget).plan
     plan, asked = last_cells(found, problem, CELLS)
-    document = json.loads(json.dumps(plan_document(plan) | {"digest": ""}))
+    document = as_written(plan)
     budgets = scenario_budgets(scenario, problem)
     own = budgets.derive()
     return Case(document, asked, gains, replace(budgets, derive=lambda: own))
+
+
+def as_written(plan):
+    """The document of a plan, as its file holds it."""
+    return json.loads(json.dumps(plan_document(plan) | {"digest": ""}))
 
 
 @pytest.fixture(autouse=True)
@@ -232,10 +238,24 @@ def value_at(document, way):
 @pytest.mark.parametrize("name", SCENARIOS)
 def test_every_entry_of_a_plan_is_compared_or_a_free_choice(name, required):
     """Each scenario's plan has a part of the kinds altered, all of them together all kinds."""
-    one = case(name, required)
+    check_kinds(case(name, required), slice(SCENARIOS.index(name), None, len(SCENARIOS)))
+
+
+def test_every_entry_of_a_way_that_limits_refuse_is_compared_or_a_free_choice():
+    problem = room_with_pillar()
+    problem = replace(problem, settings=replace(problem.settings, min_clearance=0.9))
+    way = make(problem, GAINS["scheduled"], gain_set_name="scheduled").plan
+    assert [refusal.limit for refusal in way.refused_by] == ["planner.min_clearance"]
+    one = Case(as_written(way), problem, GAINS, None)
+    check_kinds(one, slice(None), {"refused_by", "refused_by[]"})
+    with pytest.raises(RefusalError, match="a way that limits refuse has none"):
+        verify_plan(replace(way, budget=stated().budget), problem, GAINS)
+
+
+def check_kinds(one, some, but=frozenset()):
     assert refusal(one.document, one) is None
-    kinds, turn = places(one.document), SCENARIOS.index(name)
-    for kind in sorted(kinds)[turn :: len(SCENARIOS)]:
+    kinds = places(one.document)
+    for kind in sorted(kinds.keys() - but)[some]:
         if kind in FREE:
             check_beyond(one, kind, kinds[kind])
             continue
