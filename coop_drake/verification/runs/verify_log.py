@@ -16,8 +16,8 @@ the array, the index and the time:
 10. Nothing departed by more than a budget of the plan states: ``tube.check_budget_used``. Delta E and reports
     are those of its nominal motions: ``nominal_reports``.
 
-Of a run in which all drives braked, statements 5, 6 and 10 are left aside: they are about the plan's laws. The
-arrays that no check computes again, or ties to others, are named in the answer.
+Of a run in which all drives braked, statements 5, 6 and 10 are left aside: they are about the plan's laws.
+Arrays that no check computes again, or ties to others, are named in the answer.
 """
 
 from __future__ import annotations
