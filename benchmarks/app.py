@@ -12,6 +12,7 @@ from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
 from benchmarks.adversaries.measured import adversary_tasks
+from benchmarks.alarms import alarm_tasks
 from benchmarks.apart import apart_tasks
 from benchmarks.breaking import breaking_tasks
 from benchmarks.campaign_costs import campaign_tasks
@@ -116,6 +117,7 @@ def _tasks(effort: Effort) -> list[Task]:
         *critical_width_tasks(),
         *starting_tasks(),
         *breaking_tasks(),
+        *alarm_tasks(),
         *(_command_task(scenario) for scenario in _COMMANDED),
         *mapping_tasks(),
         *simulating_tasks(),

@@ -12,7 +12,7 @@ _Exact = Annotated[NotNegative, EXACT]
 
 SCALED = (
     "delay", "lag", "angle_noise", "rate_noise", "position_noise", "velocity_noise", "model_error",
-    "acceleration_error", "axis_error", "report_age",
+    "acceleration_error", "axis_error", "report_age", "grasp_noise", "turn_noise",
 )  # fmt: skip
 """Departures that a budget of the same control rate has more or less of."""
 
@@ -48,6 +48,9 @@ class Budget:
         bodies: The team's bodies, from which follows how much the rates of the axes accelerate them, each as
             [component in the tree, mass [kg], centre of mass x, y [m], inertia [kg m^2]]; empty where
             ``axis_error`` counts what the model's error leaves of this.
+        grasp_noise: Largest error with which the measured pose of a base, its joints and the object's pose
+            place a grasp; null where nobody looks at it [m].
+        turn_noise: Largest error with which they give the angle of the base; likewise [rad].
         rotors: Inertia that its rotor adds to every joint, empty or of shape (n,) [kg m^2 or kg].
     """
 
@@ -68,6 +71,8 @@ class Budget:
     axes: bool = True
     bodies: Bodies = ()
     rotors: tuple[_Exact, ...] = ()
+    grasp_noise: NotNegative | None = None
+    turn_noise: NotNegative | None = None
 
     def __post_init__(self) -> None:
         check_fields(self)
@@ -120,6 +125,8 @@ class Tolerance:
         settled_rate: Largest nominal rate in the end [rad/s or m/s].
         departure: Largest departure of the axis from its nominal motion [rad or m].
         rate_departure: Largest departure of its rate from the nominal one [rad/s or m/s].
+        alarm: Level above which a measured departure of the axis is an alarm [rad or m].
+        rate_alarm: The same for its rate [rad/s or m/s].
         entry_parts: Into how many parts the positions at the entry are cut, so that these bounds follow [-].
     """
 
@@ -135,4 +142,6 @@ class Tolerance:
     settled_rate: Vector
     departure: Vector
     rate_departure: Vector
+    alarm: Vector
+    rate_alarm: Vector
     entry_parts: tuple[Annotated[int, Limits(at_least=1, at_most=64)], ...]

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from shapely import Polygon
 
+from coop_drake.answers.alarms import Alarms
 from coop_drake.answers.axis_tracking import AxisTracking
 from coop_drake.answers.budget import Budget, Tolerance
 from coop_drake.answers.limits import Refusal, SpeedStatement
@@ -97,6 +98,8 @@ class Plan:
         speeds: Limits of speed that are kept, and what follows for the bases; null where no limit is known.
         age_factor: The gains are those of the gain set for so many times the age of its commands, so that
             limits of acceleration are kept.
+        alarms: Levels above which measured departures from the nominal motion are alarms; null without a
+            budget.
         refused_by: Limits of the scenario that the plan breaks: it shows that a way exists, but cannot be
             carried out. Empty for a plan that can.
     """
@@ -114,6 +117,7 @@ class Plan:
     tube: PositionTube | None = None
     age_factor: Annotated[Positive, EXACT] = 1.0
     axis_tracking: AxisTracking | None = None
+    alarms: Alarms | None = None
     refused_by: tuple[Refusal, ...] = ()
 
     def governed(self, index: int) -> Polygon:

@@ -78,6 +78,9 @@ class LoopNominal(NamedTuple):
             [m], shape (3,).
         axis_gains: K_a [1/s^2], zeta_a [1/s] and the lag of the nominal axes [s], shape (3,) or (0,).
         mountings: Those of all robots, see ``place_on_axes``, shape (M,).
+        levels: Of the robots' monitors, see ``largest_departure``, shape (4,) or (0,).
+        axis_alarms: Levels of all axes and of their rates in every cell, shape (C, 2, M) or (C, 2, 0).
+        reserves: What must be left of the distances of all axes to their funnels' bounds, shape (M,) or (0,).
         distances: Least distances of (theta, q) to the bounds of their funnels that the budget states for
             every cell, shape (C, 1 + n) or (0, 0) [rad or m].
     """
@@ -86,6 +89,9 @@ class LoopNominal(NamedTuple):
     position: FloatArray
     axis_gains: FloatArray
     mountings: FloatArray
+    levels: FloatArray
+    axis_alarms: FloatArray
+    reserves: FloatArray
     distances: FloatArray
 
 
@@ -145,6 +151,8 @@ class LoopMemory(NamedTuple):
         efforts: Commands that actuators follow, shape (2, 3 N + n): what is held, and what acts [N, N m].
         channels: What the channels of reports hold, shape (N, ``channel_rows``, 2).
         reports: What robots report, and what they said last before a silence, shape (2, N, 2).
+        alarms: What their monitors say, as the block ``DepartureMonitor`` shows it, and when something was
+            above its level the last time, shape (N, 4).
     """
 
     state: FloatArray
@@ -161,6 +169,7 @@ class LoopMemory(NamedTuple):
     efforts: FloatArray
     channels: FloatArray
     reports: FloatArray
+    alarms: FloatArray
 
 
 Loop = tuple[LoopCells, FusedTeam, LoopPlant, LoopNominal, LoopDepartures, LoopMemory]

@@ -21,6 +21,7 @@ from coop_drake.laws.nominal import nominal_flow
 from coop_drake.laws.sampling import whole_periods
 from coop_drake.scenario import Deployment
 from coop_drake.systems.current_cell import READY_SIZE
+from coop_drake.systems.departure_monitor import LONG_AGO
 from coop_drake.systems.ready_monitor import MOVING
 from coop_drake.systems.team_kernels import FusedTeam
 from coop_drake.tree.pose import FloatArray
@@ -148,7 +149,7 @@ def memory_of(transport: CompiledTransport, departures: LoopDepartures) -> LoopM
     nothing = np.zeros(M)
     return LoopMemory(
         state=transport.start.copy(),
-        current=np.zeros((int(departures.hearing[1].max()) + 2, 2)),
+        current=np.zeros((int(departures.hearing[1].max()) + ring, 2)),
         poses=np.zeros((ring, robots, 3)),
         states=np.zeros((ring, states)),
         lines=np.zeros((robots, 2, rows, 1 + widest)),
@@ -161,4 +162,5 @@ def memory_of(transport: CompiledTransport, departures: LoopDepartures) -> LoopM
         efforts=np.zeros((2, efforts)),
         channels=np.full((robots, channels, READY_SIZE), NOTHING),
         reports=np.full((2, robots, READY_SIZE), NOTHING),
+        alarms=np.tile([0.0, 0.0, 0.0, LONG_AGO], (robots, 1)),
     )

@@ -15,7 +15,7 @@ from coop_drake.answers.plan import Plan
 from coop_drake.compiled_loop.departing import believed, departures_of, memory_of, nominal_of
 from coop_drake.compiled_loop.preparing import CompiledTransport, prepare
 from coop_drake.compiled_loop.sampled_team import SampledTeam
-from coop_drake.compiled_loop.telling import GOVERNOR, MARGIN, POSE, READY, SHOWN, WANTED
+from coop_drake.compiled_loop.telling import ALARM, GOVERNOR, MARGIN, POSE, READY, SHOWN, WANTED
 from coop_drake.diagram.closed_loop import ClosedLoop, build_closed_loop
 from coop_drake.diagram.station import build_driven_station
 from coop_drake.fields import HarmonicMap
@@ -25,6 +25,7 @@ from coop_drake.scenario import Deployment, Scenario
 from coop_drake.simulation.logged_ports import Places, PortRow, ReportingLoop
 from coop_drake.simulation.run import run_and_release
 from coop_drake.simulation.telemetry import Sample
+from coop_drake.systems.departure_monitor import ALARM_SIZE
 from coop_drake.tree.pose import IntArray
 
 
@@ -64,6 +65,7 @@ class SampledLoop(ReportingLoop):
             ready_margins=shown[:, READY + 1],
             clock_lag=nothing,
             causes=nothing,
+            alarms=shown[:, ALARM : ALARM + ALARM_SIZE],
         )
 
 

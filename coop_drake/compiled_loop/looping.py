@@ -9,6 +9,7 @@ from coop_drake.compiled_loop.robots import (
     RobotRoom,
     follow_axes,
     heard_cell,
+    judge,
     lead,
     remember_switch,
     report,
@@ -25,6 +26,7 @@ from coop_drake.compiled_loop.watching import (
     watch_room,
 )
 from coop_drake.laws.channels import carry_reports
+from coop_drake.laws.departure import quiet_margin
 from coop_drake.laws.nominal_axes import carry_axes
 from coop_drake.laws.random_draws import uniform_pair
 from coop_drake.laws.robot_dynamics import estimate_object
@@ -136,6 +138,9 @@ def compute(
         k, sample, cell, time, room.seen[judged], room.robots[judged, : measured.size], cells, nominal,
         departures, memory, begin, whole,
     )  # fmt: skip
+    if nominal.levels.size:
+        judge(k, sample, now, team, cells, nominal, departures, memory, room, measured)
+        margin = quiet_margin(margin, memory.alarms[k, 0])
     memory.reports[0, k, 0], memory.reports[0, k, 1] = cell, margin
     if margin >= 0.0:
         remember_switch(k, cell, time, led, led_robot, cells, memory, begin)

@@ -187,6 +187,8 @@ def _nominal(plan: Plan, team: TeamPlant, knowledge: Sequence[RobotKnowledge]) -
     none, tube, motion = np.empty(0), plan.tube, knowledge[0].axis_motion
     distances = [one.tolerance.distance for one in plan.transitions if one.tolerance is not None]
     mountings = np.concatenate([base_chain(team, robot).mounting for robot in team.robots])
+    monitored = [known.monitored for known in knowledge if known.monitored is not None]
+    of_axes = [np.empty((len(plan.cells), 2, 0)), *(one.axis_alarms for one in monitored)]
     gains = none
     if motion is not None:
         gains = np.array([motion.tracking.stiffness, motion.tracking.damping, motion.lag])
@@ -195,5 +197,8 @@ def _nominal(plan: Plan, team: TeamPlant, knowledge: Sequence[RobotKnowledge]) -
         none if tube is None else np.array([tube.speed, 0.0, tube.radius]),
         gains,
         mountings,
+        monitored[0].levels if monitored else none,
+        np.ascontiguousarray(np.concatenate(of_axes, axis=2)),
+        np.concatenate([none, *(one.axis_reserve for one in monitored)]),
         np.array(distances) if motion is not None else np.empty((0, 0)),
     )

@@ -8,7 +8,8 @@ import numpy as np
 
 from coop_drake.compiled import compiled
 from coop_drake.compiled_loop.arrays import LoopCells, LoopDepartures, LoopMemory, LoopNominal
-from coop_drake.laws.axis_table import track_axes, write_jumps
+from coop_drake.laws.axis_table import bounds_of, track_axes, write_jumps
+from coop_drake.laws.departure import alarm_at, axis_level, largest_departure
 from coop_drake.laws.load_sharing import end_effector_command
 from coop_drake.laws.nominal_axes import carry_axes, place_on_axes, pull_axes
 from coop_drake.laws.robot_dynamics import robot_effort
@@ -40,6 +41,7 @@ class RobotRoom(NamedTuple):
         pulled: That of the robot's with the pull to the nominal motion, shape (M,).
         later: Nominal axes when efforts act, shape (3, M).
         fading: The jumps of the robot's axes that fade in the cell, shape (M,).
+        levels: Levels of all axes and of their rates, shape (2, M).
         held: Efforts before the sample, shape (3 N + n,) [N, N m].
         errors: Of one measurement, shape (2 (3 + n),).
         arrivals: What a channel of reports holds next, of its shape.
@@ -54,6 +56,7 @@ class RobotRoom(NamedTuple):
     pulled: FloatArray
     later: FloatArray
     fading: FloatArray
+    levels: FloatArray
     held: FloatArray
     errors: FloatArray
     arrivals: FloatArray
@@ -66,7 +69,8 @@ def robot_room(memory: LoopMemory) -> RobotRoom:
     seen, robots, later, efforts = np.empty((4, 6)), np.empty((4, state)), np.empty((3, axes)), memory.efforts
     return RobotRoom(
         np.empty(3), seen, robots, np.empty(4), np.empty(TOLD), np.empty(axes), np.empty(axes), later,
-        np.empty(axes), np.empty(efforts.shape[1]), np.empty(state), np.empty((channel[1], channel[2])),
+        np.empty(axes), np.empty((2, axes)), np.empty(efforts.shape[1]), np.empty(state),
+        np.empty((channel[1], channel[2])),
     )  # fmt: skip
 
 
@@ -260,6 +264,48 @@ def report(
         own, after, edges, stiffness, inradius, cells.goal, tolerance, last, time, seen, robot, state[4:6],
         shown,
     )  # fmt: skip
+
+
+@compiled
+def judge(
+    k: int, sample: int, now: float, team: FusedTeam, cells: LoopCells, nominal: LoopNominal,
+    departures: LoopDepartures, memory: LoopMemory, room: RobotRoom, robot: FloatArray,
+) -> None:  # fmt: skip
+    """Write what the monitor of robot k says, by what it has measured.
+
+    Args:
+        k: The robot.
+        sample: Number of the sample, or of the next one between two samples.
+        now: Time of the run [s].
+        team: The robots' models.
+        cells: The plan's cells.
+        nominal: The nominal motions.
+        departures: What departs.
+        memory: What changes.
+        room: Holds the object's state as the robot measures it.
+        robot: Its own, shape (2 (3 + n_k),).
+    """
+    begin, size = k + team.first[2, k], 1 + team.first[2, k + 1] - team.first[2, k]
+    age, own = int(departures.periods[0]), size if nominal.axis_alarms.shape[2] else 0
+    made = max(sample - age, 0)
+    axes = memory.axes[made % memory.axes.shape[0], :2, begin : begin + own]
+    stated, levels = nominal.axis_alarms, room.levels[:, begin : begin + own]
+    cell, time = heard_cell(k, made, made * departures.times[0] if age else now, departures, memory)
+    for i in range(own):
+        levels[0, i], levels[1, i] = stated[cell, 0, begin + i], stated[cell, 1, begin + i]
+        if sample >= age:
+            lower, upper = bounds_of(cells.tables[cell, begin + i], time)[:2]
+            reserve = nominal.reserves[begin + i]
+            levels[0, i] = axis_level(levels[0, i], reserve, axes[0, i], lower, upper)
+    led, alarms = memory.nominal[made % memory.nominal.shape[0]], memory.alarms[k]
+    chain = team.chains[team.first[0, k] : team.first[0, k + 1]]
+    mounting = nominal.mountings[begin : begin + size]
+    share, which = largest_departure(
+        chain, team.loads[k], mounting, robot, room.seen[0], led, axes, nominal.levels, levels
+    )
+    alarms[0], alarms[1], alarms[2] = alarm_at(share, now, alarms[3]), share, which
+    if share > 1.0:
+        alarms[3] = now
 
 
 @compiled

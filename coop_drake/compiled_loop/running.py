@@ -10,6 +10,7 @@ from coop_drake.compiled_loop.departing import believed, departures_of, memory_o
 from coop_drake.compiled_loop.looping import run_loop
 from coop_drake.compiled_loop.preparing import CompiledTransport
 from coop_drake.compiled_loop.watching import (
+    ALARM,
     ARRIVED,
     AT_BODY,
     AT_WALL,
@@ -21,18 +22,21 @@ from coop_drake.compiled_loop.watching import (
     FUNNEL,
     FUNNEL_AXIS,
     FUNNEL_CELL,
+    HELD,
     LATE,
     OUT_OF_FUNNEL,
     OUT_OF_REGION,
     OUT_OF_SLICE,
     PLACE,
     REGION,
+    ROBOT,
     SAMPLES,
     SHARE,
     STALLED,
     VALUE,
     WALL,
 )
+from coop_drake.laws.departure import departing_name
 from coop_drake.plant.configuration import displacement
 from coop_drake.scenario import Deployment
 from coop_drake.tree.pose import FloatArray
@@ -56,6 +60,8 @@ class RunOutcome:
         budget_share: Largest share used of what the plan's budget states: of the tube's radius, or the
             least distance of an axis to its funnel's bounds over the one that it kept; NaN for a plan
             without a budget [-].
+        alarm_share: Largest measured departure from the nominal motion over its level; NaN for a plan without
+            a budget [-].
         peak_force: Largest force of a base [N].
         peak_torque: Largest effort of a joint [N m or N]; NaN for a team without joints.
     """
@@ -71,6 +77,7 @@ class RunOutcome:
     wall_clearance: float
     body_clearance: float
     budget_share: float
+    alarm_share: float
     peak_force: float
     peak_torque: float
 
@@ -114,7 +121,7 @@ def _outcome(transport: CompiledTransport, figures: FloatArray, period: float) -
     arrived = figures[ENDED] == ARRIVED
     return RunOutcome(
         arrived=bool(arrived),
-        reason="" if arrived else _reason(figures, axes, period),
+        reason="" if arrived else _reason(transport, figures, axes, period),
         time=float(figures[SAMPLES] * period),
         steps=int(figures[SAMPLES]),
         funnel_margin=float(figures[FUNNEL]),
@@ -124,14 +131,21 @@ def _outcome(transport: CompiledTransport, figures: FloatArray, period: float) -
         wall_clearance=float(figures[WALL]),
         body_clearance=float(figures[BODY]),
         budget_share=float(figures[SHARE]),
+        alarm_share=float(figures[ALARM]),
         peak_force=float(figures[FORCE]),
         peak_torque=float(figures[EFFORT]) if transport.plan.joint_names else nan,
     )
 
 
-def _reason(figures: FloatArray, axes: tuple[str, ...], period: float) -> str:
+def _reason(transport: CompiledTransport, figures: FloatArray, axes: tuple[str, ...], period: float) -> str:
     """Return why a run ended, as the log of Drake's loop says it."""
     time, cell, value = figures[SAMPLES] * period, int(figures[CELL]), figures[VALUE]
+    if figures[ENDED] == HELD:
+        k = int(figures[ROBOT])
+        robot, (first, last) = transport.robot_names[k], transport.team.first[2, k : k + 2].tolist()
+        what = departing_name(int(figures[PLACE]), axes[1 + first : 1 + last])
+        said = f"{robot} asks for a hold: {what} departs {value:.3g} times as far as its level allows"
+        return f"at t = {time:.6g} s in cell {cell}: {said}, as {robot} measures it"
     axis = axes[int(figures[PLACE])]
     text = {
         STALLED: f"stalled, {value:.6g} s after its entry",

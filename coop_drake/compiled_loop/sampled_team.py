@@ -28,7 +28,7 @@ class SampledTeam(Block):
     input   ``team_state`` 2 (3 + n)      the plant's positions and velocities, its own order
     output  ``efforts``    3 N + n        what the actuators of every robot give: its base wrench and  W
                                           its joint torques [N, N m]
-    output  ``telemetry``  3 + 17 N + 2 M index of the cell, time of its entry [s], 1 where the team   W
+    output  ``telemetry``  3 + 20 N + 2 M index of the cell, time of its entry [s], 1 where the team   W
                                           has arrived; what ``telling`` lists of every robot; lower,
                                           then upper bounds of the funnels of all axes
     ======= ============== ============== ============================================================ =====

@@ -15,11 +15,11 @@ from coop_drake.systems.nominal_kernels import nominal_margin
 from coop_drake.systems.team_kernels import FusedTeam, read_own
 from coop_drake.tree.pose import FloatArray
 
-SHOWN = 17
-"""Numbers that a robot shows: pose of its base (3), p_G (2), Delta E, its report (2), then from
-``WANTED`` on the object's desired acceleration (3) and the command of the end effector (6)."""
+SHOWN = 20
+"""Numbers that a robot shows: pose of its base (3), p_G (2), Delta E, its report (2), what its monitor says
+(3), then from ``WANTED`` on the object's desired acceleration (3) and the command of the end effector (6)."""
 
-POSE, GOVERNOR, MARGIN, READY, WANTED = 0, 3, 5, 6, 8
+POSE, GOVERNOR, MARGIN, READY, ALARM, WANTED = 0, 3, 5, 6, 8, 11
 """Where they stand."""
 
 
@@ -64,6 +64,7 @@ def tell(
             edges = cells.governed[cells.first[0, heard] : cells.first[0, heard + 1]]
             row[MARGIN] = nominal_margin(edges, cells.numbers[heard, 1], led)
         row[READY : READY + 2] = memory.reports[0, k]
+        row[ALARM : ALARM + 3] = memory.alarms[k, :3]
         row[WANTED:] = told[ACCELERATION : COMMAND + 6]
         own = np.empty(2 * (end - begin))
         write_bounds(cells.tables[heard, begin:end], time, own)

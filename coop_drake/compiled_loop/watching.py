@@ -24,7 +24,7 @@ from coop_drake.laws.readiness import interval_margin, position_arrival
 from coop_drake.systems.team_kernels import FusedTeam
 from coop_drake.tree.pose import FloatArray
 
-FIGURES = 14
+FIGURES = 16
 (
     ENDED,
     PLACE,
@@ -40,13 +40,16 @@ FIGURES = 14
     SAMPLES,
     VALUE,
     CELL,
+    ROBOT,
+    ALARM,
 ) = range(FIGURES)
 """Figures of a run: how it ended, the axis if one ended it, the smallest distance of an axis to a bound of
 its funnel, this axis and its cell, smallest distances of the position to the boundary of its cell, of bodies
 to walls and to each other, the largest share of the budget, largest force and joint effort, number of
-samples, and the value and the cell at the end."""
+samples, the value and the cell at the end, the robot that ended it, and the largest measured departure over
+its level."""
 
-RUNS, ARRIVED, STALLED, LATE, OUT_OF_FUNNEL, OUT_OF_SLICE, OUT_OF_REGION, AT_WALL, AT_BODY = range(9)
+RUNS, ARRIVED, STALLED, LATE, OUT_OF_FUNNEL, OUT_OF_SLICE, OUT_OF_REGION, AT_WALL, AT_BODY, HELD = range(10)
 """How a run may have ended."""
 
 
@@ -80,7 +83,7 @@ def begin_figures() -> FloatArray:
     figures = np.zeros(FIGURES)
     for i in (FUNNEL, REGION, WALL, BODY):
         figures[i] = inf
-    figures[SHARE] = np.nan
+    figures[SHARE] = figures[ALARM] = np.nan
     return figures
 
 
@@ -120,6 +123,7 @@ def watch(
         led = memory.nominal[sample % memory.nominal.shape[0]]
         _use(hypot(z[0] - led[0], z[1] - led[1]) / nominal.position[2], figures)
     _watch_efforts(team, memory, figures)
+    _watch_alarms(nominal, memory, figures)
     if cell + 1 == cells.rows.shape[0] and left_by_all(cell, memory) and _at_goal(cell, z, cells, plant):
         end(figures, ARRIVED, 0.0)
     elif time > cells.numbers[cell, 2]:
@@ -203,6 +207,17 @@ def _watch_efforts(team: FusedTeam, memory: LoopMemory, figures: FloatArray) -> 
             figures[FORCE] = max(figures[FORCE], hypot(x, y))
         for i in range(team.first[2, k + 1] - team.first[2, k]):
             figures[EFFORT] = max(figures[EFFORT], abs(memory.efforts[1, own + 3 + i]))
+
+
+@compiled
+def _watch_alarms(nominal: LoopNominal, memory: LoopMemory, figures: FloatArray) -> None:
+    """End the run where a robot asks for a hold: this loop does not know holds."""
+    for k in range(memory.alarms.shape[0]):
+        if nominal.levels.size and not figures[ALARM] > memory.alarms[k, 1]:
+            figures[ALARM] = memory.alarms[k, 1]
+        if memory.alarms[k, 0] > 0.0 and figures[ENDED] == RUNS:
+            figures[ROBOT] = k
+            end(figures, HELD, memory.alarms[k, 1], int(memory.alarms[k, 2]))
 
 
 @compiled

@@ -12,7 +12,7 @@ from coop_drake.answers.plan import Plan
 from coop_drake.diagram.deployment import DeployedController, deploy
 from coop_drake.diagram.fused import FusedControllers, add_fused_controllers
 from coop_drake.diagram.hold import add_supervisor
-from coop_drake.diagram.knowledge import robot_knowledge
+from coop_drake.diagram.knowledge import hold_of, robot_knowledge
 from coop_drake.diagram.loop import Loop
 from coop_drake.diagram.robot_controller import Replacements, build_robot_controller
 from coop_drake.diagram.station import build_driven_station, build_station
@@ -33,7 +33,7 @@ class ClosedLoop(Loop):
         cell_planner: The supervisor.
         controllers: One sub-Diagram for each robot, as the others see it.
         deployed: Controllers with sensors, actuators and radio, empty where the team is ideal.
-        supervisor: What holds the team, None where a scenario has no holds.
+        supervisor: What holds the team, None where nothing can ask for it.
         fused: The block that drives the team in the fused mode, which has no controllers of single robots.
     """
 
@@ -95,7 +95,7 @@ def build_closed_loop(
     planner = builder.AddNamedSystem(
         "cell_planner", CellPlanner(len(team.robots), len(plan.cells), period=scenario.deployment.period)
     )
-    hold, supervisor = scenario.control.hold, None
+    hold, supervisor = hold_of(scenario, plan), None
     if hold is not None:
         heard = len(team.robots) if blocks == "named" else 0
         supervisor = add_supervisor(builder, hold, planner, heard, scenario.deployment.period)

@@ -58,6 +58,7 @@ class DeployedController:
         axes = np.array([object_pose[2], *joints])
         self._rest(root, "nominal_axes", axes)
         self._rest(root, "axis_ppc", cell, axes)
+        self._rest(root, "departure_monitor", object_pose[:2], axes, cell)
         self.keep_position(root, object_pose[:2])
         _prepare(self.heard, root)
 

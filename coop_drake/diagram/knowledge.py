@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from math import inf
 
 import numpy as np
 
@@ -15,10 +16,10 @@ from coop_drake.laws.disturbance import observer_gains
 from coop_drake.laws.governor import FIELD_SPEED, slowdown_radius
 from coop_drake.laws.readiness import REST_WINDOW
 from coop_drake.laws.sampling import whole_periods
-from coop_drake.plant import RobotPlant, TeamPlant, base_chain, build_robot_plant
+from coop_drake.plant import RobotPlant, TeamPlant, base_chain, build_robot_plant, robot_chain
 from coop_drake.plant.team import RobotModel
-from coop_drake.scenario import Deployment, Scenario
-from coop_drake.systems import AxisMotion, GovernedCell, NominalMotion
+from coop_drake.scenario import Deployment, Hold, Scenario
+from coop_drake.systems import AxisMotion, GovernedCell, MonitoredRobot, NominalMotion
 
 REPORT_PERIODS = 2
 """Periods in which p_G moves on in the old cell after a report was received [-]: the one in which the switch
@@ -52,6 +53,7 @@ def robot_knowledge(
         )
     ]
     factor, deployment, control = 1.0 + scenario.deployment.mass_error, scenario.deployment, scenario.control
+    hold = hold_of(scenario, plan)
     delay = whole_periods(deployment.measurements.delay, deployment.period) if deployment.period else 0
     return [
         RobotKnowledge(
@@ -66,14 +68,20 @@ def robot_knowledge(
             period=deployment.period,
             sample_offset=deployment.of_robot(robot.name).sample_offset,
             predicted_periods=delay if control.predictor else 0,
-            hold=control.hold,
+            hold=hold,
             rest_samples=rest_samples(deployment),
             observer_gains=observer_gains(scenario.command_age) if control.observer else None,
             motion=_motion(scenario, plan, robot.name, 0 if control.predictor else delay),
             axis_motion=_axis_motion(scenario, plan, team, robot, 0 if control.predictor else delay),
+            monitored=_monitored(scenario, plan, team, robot, delay),
         )
         for robot in team.robots
     ]
+
+
+def hold_of(scenario: Scenario, plan: Plan) -> Hold | None:
+    """Return when the team is held, None for never; where a plan has a budget, monitors may ask for it."""
+    return scenario.control.hold or (None if plan.alarms is None else Hold())
 
 
 def rest_samples(deployment: Deployment) -> int:
@@ -139,12 +147,43 @@ def _axis_motion(
     )
 
 
+def _monitored(
+    scenario: Scenario, plan: Plan, team: TeamPlant, robot: RobotModel, age: int
+) -> MonitoredRobot | None:
+    """Return what a robot's monitor of departures needs, None where the plan has no budget."""
+    deployment, alarms = scenario.deployment, plan.alarms
+    if alarms is None or deployment.period is None:
+        return None
+    own = [0, *range(1 + robot.q_slice.start, 1 + robot.q_slice.stop)]
+    stated = [one.tolerance for one in plan.transitions if one.tolerance is not None]
+    axis_alarms = np.array([[one.alarm[own], one.rate_alarm[own]] for one in stated])
+    return MonitoredRobot(
+        chain=robot_chain(_robot(scenario, robot.index, 1.0)),
+        p_LE=np.array([robot.X_LE.x, robot.X_LE.y]),
+        mounting=base_chain(team, robot).mounting,
+        levels=np.array(
+            [
+                inf if one is None else one
+                for one in (alarms.position, alarms.velocity, alarms.grasp, alarms.turn)
+            ]
+        ),
+        axis_alarms=axis_alarms if stated else np.empty((len(plan.cells), 2, 0)),
+        axis_reserve=alarms.axis_reserve[own] if stated else np.empty(0),
+        start=plan.start[[0, 1, *(2 + i for i in own)]],
+        period=deployment.period,
+        measurement_periods=age,
+        offset=deployment.of_robot(robot.name).sample_offset,
+    )
+
+
 def _field(harmonic_map: HarmonicMap, governor_gain: float) -> VelocityField:
     radius = slowdown_radius(FIELD_SPEED, governor_gain)
     return VelocityField(harmonic_map, FIELD_SPEED, slowdown_radius=radius)
 
 
 def _check(plan: Plan, maps: Sequence[HarmonicMap], team: TeamPlant) -> None:
+    if plan.tube is not None and plan.alarms is None:
+        raise PlanError("the plan has a budget, but no alarm levels: plan again")
     if plan.joint_names != team.joint_names:
         raise PlanError(
             f"the plan moves the joints {', '.join(plan.joint_names)}; the scenario's team has "

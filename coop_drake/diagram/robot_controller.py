@@ -16,11 +16,13 @@ from coop_drake.systems import (
     AxisLaw,
     AxisMotion,
     AxisPpc,
+    DepartureMonitor,
     DisturbanceObserver,
     FunnelClock,
     GovernedCell,
     HoldMonitor,
     HoldReceiver,
+    MonitoredRobot,
     NominalAxes,
     NominalGovernor,
     NominalMotion,
@@ -70,6 +72,7 @@ class RobotKnowledge:
         motion: The nominal motion of the position; None where p_G follows the measured position.
         axis_motion: That of the object's angle and of its joints; None where their law acts on what is
             measured.
+        monitored: What its monitor of departures needs; None where there is no nominal motion.
     """
 
     robot: RobotPlant
@@ -88,6 +91,7 @@ class RobotKnowledge:
     rest_samples: int = 0
     motion: NominalMotion | None = None
     axis_motion: AxisMotion | None = None
+    monitored: MonitoredRobot | None = None
 
     @property
     def p_LE(self) -> FloatArray:
@@ -115,8 +119,10 @@ def build_robot_controller(knowledge: RobotKnowledge, replacements: Replacements
     input   ``current_cell``      2           (index, entry time), from the cell planner
     output  ``robot_effort``      3 + n       its base wrench and joint torques
     output  ``ready``             2           (index, margin), for the cell planner
-    input   ``hold_message``      2           from the hold supervisor, only where a scenario has holds
-    output  ``hold_request``      2           to the hold supervisor, only where a scenario has holds
+    input   ``hold_message``      2           from the hold supervisor, only where the team may be held
+    output  ``hold_request``      2           to the hold supervisor, only where the team may be held
+    output  ``alarm``             3           of its monitor of departures, for itself and the log, only where
+                                              the plan has a budget
     output  see ``TELEMETRY``                 for the log and for users, not for other robots
     ======= ===================== =========== ==========================================================
 
@@ -149,7 +155,8 @@ def build_robot_controller(knowledge: RobotKnowledge, replacements: Replacements
         outputs["observed_rates"] = _integrated(builder, knowledge, "observer_state", rate, at_rest)
     _connect_by_name(builder, blocks, outputs)
     held = HELD if knowledge.hold is not None else ()
-    for name in ("robot_effort", "ready", *TELEMETRY, *held):
+    alarm = () if knowledge.monitored is None else ("alarm",)
+    for name in ("robot_effort", "ready", *TELEMETRY, *held, *alarm):
         builder.ExportOutput(outputs[name], name)
     return builder.Build()
 
@@ -218,7 +225,12 @@ def _additions(knowledge: RobotKnowledge, laws: Sequence[AxisLaw]) -> dict[str, 
         silence = knowledge.hold.silence
         added["hold_receiver"] = HoldReceiver(silence, period=period, offset=offset)
         added["funnel_clock"] = FunnelClock(period, offset)
-        added["hold_monitor"] = HoldMonitor(laws, knowledge.hold.energy, period=period, offset=offset)
+        alarmed = knowledge.monitored is not None
+        added["hold_monitor"] = HoldMonitor(
+            laws, knowledge.hold.energy, alarmed=alarmed, period=period, offset=offset
+        )
+    if knowledge.monitored is not None:
+        added["departure_monitor"] = DepartureMonitor(knowledge.monitored)
     if knowledge.observer_gains is not None:
         joints = knowledge.joints.stop - knowledge.joints.start
         added["disturbance_observer"] = DisturbanceObserver(joints, *knowledge.observer_gains)
@@ -264,6 +276,9 @@ _FOLLOWERS = ("axis_ppc", "ready_monitor")
 _AHEAD = {"object_state": "object_ahead", "robot_state": "robot_ahead"}
 """Which signals the blocks that command get then: measured angles and rates would be late and noisy."""
 
+_RAW = ("state_predictor", "departure_monitor")
+"""Blocks that get what was measured where others get a prediction."""
+
 _COMPENSATED = ("wrench_law", "robot_effort")
 """Blocks that command; all others take the accelerations that the law wants."""
 
@@ -275,7 +290,7 @@ def _connect_by_name(
     outside: set[str] = set()
     for label, block in blocks.items():
         renamed: dict[str, str] = {}
-        if "state_predictor" in blocks and label != "state_predictor":
+        if "state_predictor" in blocks and label not in _RAW:
             renamed |= _REPLACED["state_predictor"]
         if "nominal_axes" in blocks and label != "nominal_axes":
             if label in _FOLLOWERS:

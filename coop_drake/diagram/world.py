@@ -9,6 +9,7 @@ from pydrake.systems.framework import Context, DiagramBuilder
 
 from coop_drake.answers.plan import Plan
 from coop_drake.diagram.deployment import Body, build_body
+from coop_drake.diagram.knowledge import hold_of
 from coop_drake.diagram.loop import Loop
 from coop_drake.diagram.station import build_station
 from coop_drake.errors import ScenarioError
@@ -57,10 +58,10 @@ def control_period(scenario: Scenario) -> float:
     return period
 
 
-def record_sizes(scenario: Scenario, joints: Sequence[int]) -> tuple[dict[str, int], ...]:
+def record_sizes(scenario: Scenario, plan: Plan, joints: Sequence[int]) -> tuple[dict[str, int], ...]:
     """Return names and sizes of what robots with numbers of joints, then their supervisor, report."""
-    holds = scenario.control.hold is not None
-    robots = (robot_record(n, holds=holds) for n in joints)
+    holds = hold_of(scenario, plan) is not None
+    robots = (robot_record(n, holds=holds, monitored=plan.alarms is not None) for n in joints)
     return (*robots, supervisor_record(len(joints), holds=holds))
 
 
@@ -80,7 +81,7 @@ def build_world(scenario: Scenario, plan: Plan, exchange: Exchange) -> World:
     team = station.team
     builder.AddNamedSystem("transport_station", station.diagram)
     joints = [len(robot.joints) for robot in team.robots]
-    records = record_sizes(scenario, joints)
+    records = record_sizes(scenario, plan, joints)
     size = sum(sum(record.values()) for record in records)
     link = builder.AddNamedSystem("team_link", TeamLink(joints, period, exchange, size))
     bodies = []

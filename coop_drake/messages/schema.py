@@ -203,7 +203,7 @@ class Ready(NamedTuple):
 
 @message(49, "team", "robot")
 class HoldRequest(NamedTuple):
-    """A robot's request that the team be held, in every period where a scenario has holds.
+    """A robot's request that the team be held, in every period where a scenario has holds or a plan a budget.
 
     Attributes:
         asks: Whether it asks for a hold.
@@ -229,7 +229,7 @@ class Switch(NamedTuple):
 
 @message(51, "team", "supervisor")
 class Hold(NamedTuple):
-    """The supervisor's bit, in every period where a scenario has holds.
+    """The supervisor's bit, in every period where a scenario has holds or a plan a budget.
 
     Attributes:
         held: Whether the team is held.

@@ -10,9 +10,11 @@ import numpy as np
 from coop_drake.answers.log import SimulationLog
 from coop_drake.answers.plan import Plan
 from coop_drake.diagram import build_world, control_period
-from coop_drake.diagram.knowledge import robot_knowledge
+from coop_drake.diagram.knowledge import hold_of, robot_knowledge
 from coop_drake.fields import HarmonicMap
+from coop_drake.messages import name_of
 from coop_drake.nodes.robot_node import RobotNode
+from coop_drake.nodes.states import STANDS
 from coop_drake.nodes.supervisor_node import SupervisorNode
 from coop_drake.scenario import Scenario
 from coop_drake.simulation import Sample, run_loop
@@ -47,8 +49,9 @@ class DirectExchange:
         return [effort for effort, _ in done]
 
     def trouble(self) -> str:
-        """See ``Exchange``; nobody can be missing."""
-        return ""
+        """See ``Exchange``; nobody can be missing, but a robot may want the drives to brake."""
+        names = " and ".join(name_of(k) for k, robot in enumerate(self.robots) if robot.state == STANDS)
+        return f"{names} lets the drives brake" if names else ""
 
     def stopped(self) -> bool:
         """See ``Exchange``; nobody can be missing."""
@@ -75,7 +78,7 @@ def simulate_apart(
     deployment = scenario.deployment
     known = robot_knowledge(scenario, plan, maps, world.team)
     carried.robots = [RobotNode(own, deployment, k, world.team.robots[k].name) for k, own in enumerate(known)]
-    carried.supervisor = SupervisorNode(len(known), len(plan.cells), period, scenario.control.hold)
+    carried.supervisor = SupervisorNode(len(known), len(plan.cells), period, hold_of(scenario, plan))
     try:
         return run_loop(world, scenario, observer=observer)
     finally:

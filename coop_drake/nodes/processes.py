@@ -16,7 +16,7 @@ from pydrake.systems.framework import DiagramBuilder
 from coop_drake.answers.plan import Plan
 from coop_drake.answers.plan_file import plan_digest
 from coop_drake.diagram import control_period
-from coop_drake.diagram.knowledge import robot_knowledge
+from coop_drake.diagram.knowledge import hold_of, robot_knowledge
 from coop_drake.diagram.station import build_station
 from coop_drake.errors import CoopDrakeError
 from coop_drake.fields import HarmonicMap
@@ -102,7 +102,7 @@ def run_supervisor(
     Raises:
         MessagingError: The others cannot be reached, or fall silent.
     """
-    period, hold = control_period(scenario), scenario.control.hold
+    period, hold = control_period(scenario), hold_of(scenario, plan)
     node = SupervisorNode(len(book.robots), len(plan.cells), period, hold)
     end = SupervisorEnd(book, question_of(scenario, plan), keys, tap, Links(faults, period))
     try:

@@ -11,6 +11,7 @@ import numpy as np
 from coop_drake.diagram.deployment import deploy
 from coop_drake.diagram.robot_controller import RobotKnowledge, build_robot_controller
 from coop_drake.laws.beginning import POSITION_WAITS, widen_slice
+from coop_drake.laws.departure import BRAKES
 from coop_drake.laws.sampling import period_of, whole_periods
 from coop_drake.messages import AtRest, Begin, Hold, HoldRequest, Place, Ready, Switch
 from coop_drake.nodes.sampled import SampledDiagram, row_of
@@ -39,7 +40,9 @@ class RobotNode:
     """Computes one robot's efforts and messages from its own measurements and what the supervisor says.
 
     While its drives brake, it stands: it sets its states to those of a robot that begins the current cell at
-    rest where it is, and says so where it may. On the supervisor's order it begins, as all others do.
+    rest where it is, and says so where it may. On the supervisor's order it begins, as all others do. Where
+    it departs from its nominal motion by far more than its monitor allows, it stands at once, so that the
+    drives brake.
 
     Sensors may show the object's angle and joints without limits in any turn: each value counts in the turn
     in which it is nearest to the one before, at first to the plan's start, and to the middle of the current
@@ -62,13 +65,14 @@ class RobotNode:
         self._deployed = deploy(controller, deployment, robot, name, bodiless=True)
         self._controller, self._sampled = controller, SampledDiagram(self._deployed.diagram)
         self.period, self._held = knowledge.period or 0.0, knowledge.hold is not None
+        self._monitored = knowledge.monitored is not None
         self._joints = knowledge.joints.stop - knowledge.joints.start
         self._state_size = 2 * (3 + self._joints)
         axes = [0, *range(1 + knowledge.joints.start, 1 + knowledge.joints.stop)]
         self._tables = [law.table for law in axis_laws(knowledge.plan, axes)]
         # Compiled here, and not while the team waits for an answer.
         widen_slice(self._tables[0][0], 0.0, np.empty_like(self._tables[0][0]))
-        record = robot_record(self._joints, holds=self._held)
+        record = robot_record(self._joints, holds=self._held, monitored=self._monitored)
         self._logged = [name for name, size in record.items() if size]
         self._cell, self._hold_message = np.zeros(2), np.zeros(2)
         self._said, self._reported, self._told_rest = Ready(0, False), inf, -inf
@@ -135,11 +139,13 @@ class RobotNode:
         if not self._follows(time, measured, stopped=stopped):
             return np.zeros(3 + self._joints), self._stand(time, measured) if self.place.known else []
         self._sampled.at(time, self._inputs(measured))
+        brakes = self._monitored and row_of(self._sampled, self._controller, ["alarm"])[0] >= BRAKES
         self._sampled.update()
         position, until = self._waits
         if self._number < until:
             self._deployed.keep_position(self._sampled.context, position)
-        self.state = HOLDS if self._held and self._hold_message[0] > 0.0 else FOLLOWS
+        held = self._held and self._hold_message[0] > 0.0
+        self.state = STANDS if brakes else HOLDS if held else FOLLOWS
         return self._sampled.output("robot_effort"), self._messages()
 
     def hear(self, messages: Iterable[Any]) -> None:

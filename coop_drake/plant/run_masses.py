@@ -32,10 +32,7 @@ def run_setup(scenario: Scenario) -> RunSetup:
     context, deployment = team.plant.CreateDefaultContext(), scenario.deployment
     springs = team.plant.num_force_elements() > 1  # every plant has gravity
     deaf = any(robot.deaf is not None for robot in deployment.robots.values())
-    one_hold = scenario.control.hold is None or not (deaf or deployment.messages != Messages())
-    one_clock = one_hold and all(
-        robot.clock_error == robot.switch_delay == 0.0 for robot in deployment.robots.values()
-    )
+    one_clock = all(robot.clock_error == robot.switch_delay == 0.0 for robot in deployment.robots.values())
     return RunSetup(
         scenario_digest=scenario_digest(scenario),
         robot_names=tuple(robot.name for robot in team.robots),
@@ -47,7 +44,7 @@ def run_setup(scenario: Scenario) -> RunSetup:
         and not deployment.pushes
         and all(robot.counted == robot for robot in deployment.robots.values()),
         can_be_held=scenario.control.hold is not None,
-        one_hold=one_hold,
+        one_hold=not deaf and deployment.messages == Messages(),
         one_clock=one_clock,
         alike=one_clock and all(robot.sample_offset == 0.0 for robot in deployment.robots.values()),
         grasps=np.array([[robot.X_LE.x, robot.X_LE.y] for robot in team.robots]),

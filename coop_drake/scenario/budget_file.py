@@ -10,7 +10,7 @@ from typing import NamedTuple
 from coop_drake.answers.budget import Budget
 from coop_drake.errors import ScenarioError
 from coop_drake.scenario.deployment import Floor, RobotDepartures
-from coop_drake.scenario.measured_bounds import rate_levers, wave_bounds
+from coop_drake.scenario.measured_bounds import grasp_bounds, rate_levers, wave_bounds
 from coop_drake.scenario.model import Scenario
 from coop_drake.scenario.reading import read_file
 from coop_drake.tree import ComponentTree
@@ -28,6 +28,13 @@ beyond it as a normal number is beyond ``DEVIATIONS``."""
 
 DEVIATIONS = 3.0
 """Standard deviations of a normal noise that count as its bound [-]: one sample in 370 is beyond."""
+
+GRASP_DEVIATIONS = 7.0
+"""Standard deviations that count as the bound of where a robot's own measurements place its grasp [-]:
+nothing else enters this check, and every one beyond is a false alarm. Of vectors in the plane 2e-11 are."""
+
+GRASP_PLAY = 1e-4
+"""What grasps and rounding may add to it [m, rad]."""
 
 REPORTS_LOST = 5
 """Reports lost in a row for which a budget provides [-]: one in 3000 times where a fifth of them is lost."""
@@ -98,6 +105,8 @@ def _of_deployment(scenario: Scenario, tree: ComponentTree, masses: TeamMasses, 
     mean = PLANE_DEVIATIONS * share
     lost = REPORTS_LOST * deployment.period if messages.loss > 0.0 else 0.0
     waves, start = wave_bounds(measured.waves, tree), deployment.start_offset
+    noises = GRASP_DEVIATIONS * measured.position_noise, GRASP_DEVIATIONS * measured.angle_noise
+    grasp, turn = grasp_bounds(measured.waves, tree, *noises)
     return Budget(
         control_rate=deployment.control_rate,
         delay=measured.delay,
@@ -119,6 +128,8 @@ def _of_deployment(scenario: Scenario, tree: ComponentTree, masses: TeamMasses, 
         axes=axes,
         bodies=masses.bodies if axes else (),
         rotors=masses.rotors if axes else (),
+        grasp_noise=grasp + GRASP_PLAY,
+        turn_noise=turn + GRASP_PLAY,
     )
 
 

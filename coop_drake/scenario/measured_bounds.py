@@ -55,6 +55,30 @@ def rate_levers(tree: ComponentTree) -> float:
     return max(hypot(1.0, reach, *levers) for reach, levers, _ in _branches(tree))
 
 
+def grasp_bounds(waves: Waves, tree: ComponentTree, position: float, angle: float) -> tuple[float, float]:
+    """Return the largest errors of a grasp's place [m] and of a base's angle [rad] by what a robot measures.
+
+    They are what the measured pose of the base and the joints on one side, and the object's pose on the other
+    differ by. Errors of noise are independent; those of waves add up. A grasp is not farther from L, and a
+    base or a joint not farther from its grasp than twice, than the team reaches.
+
+    Args:
+        waves: Bounded errors.
+        tree: The team.
+        position: Largest error of a position by noise [m].
+        angle: Largest error of an angle or a joint's position by noise [rad or m].
+    """
+    grasp = turn = 0.0
+    for reach, levers, turning in _branches(tree):
+        arms = [2.0 * reach, *(reach + lever for lever in levers)]
+        noise = hypot(position, position, *(angle * arm for arm in (reach, *arms)))
+        same = hypot(waves.x.size, waves.y.size) + reach * waves.angle.size
+        grasp = max(grasp, noise + same + sum(arms[1:]) * waves.joints.size)
+        turns = angle * hypot(1.0, *[1.0] * (1 + turning))
+        turn = max(turn, turns + waves.angle.size + turning * waves.joints.size)
+    return grasp, turn
+
+
 def _branches(tree: ComponentTree) -> Iterator[tuple[float, list[float], int]]:
     """Yield for the joints from the object to each component what counts of their rates.
 

@@ -11,6 +11,7 @@ import numpy as np
 from pydrake.systems.framework import Context, System
 
 from coop_drake.diagram import TELEMETRY, ClosedLoop, Loop, World
+from coop_drake.systems.departure_monitor import ALARM_SIZE
 from coop_drake.systems.team_kernels import telemetry_parts
 from coop_drake.tree.pose import FloatArray
 
@@ -68,6 +69,7 @@ class Places(NamedTuple):
     ready_margins: Any
     clock_lag: Any
     causes: Any
+    alarms: Any
 
 
 def places_of(loop: LoggedLoop, ports: PortRow) -> Places:
@@ -102,6 +104,8 @@ def _named_places(loop: ClosedLoop, ports: PortRow) -> Places:
     logged = [name for name in TELEMETRY if name != "object_state"]
     of = {name: [ports.add(law, name) for law in loop.bare_controllers] for name in ("ready", *logged)}
     clock = [] if loop.supervisor is None else ports.add(loop.bare_controllers[0], "clock")
+    monitored = [law for law in loop.bare_controllers if law.HasOutputPort("alarm")]
+    alarms = [ports.add(law, "alarm") for law in monitored]
     # Every robot has bounds for the angle; they are equal, and the first robot's are taken.
     bounds = [np.split(funnels, 2) for funnels in of["funnels"]]
     return Places(
@@ -119,6 +123,7 @@ def _named_places(loop: ClosedLoop, ports: PortRow) -> Places:
         ready_margins=np.array([margin for _, margin in of["ready"]]),
         clock_lag=np.array(clock[:1], dtype=np.intp),
         causes=np.array(_causes(loop, ports), dtype=np.intp),
+        alarms=np.array(alarms, dtype=np.intp).reshape(-1, ALARM_SIZE),
     )
 
 
@@ -147,6 +152,7 @@ def _fused_places(loop: ClosedLoop, ports: PortRow) -> Places:
         ready_margins=ports.add(fused.driver, "ready")[1::2],
         clock_lag=np.array(clock[:1], dtype=np.intp),
         causes=np.array(_causes(loop, ports), dtype=np.intp),
+        alarms=np.empty((0, ALARM_SIZE), dtype=np.intp),
     )
 
 
@@ -177,6 +183,7 @@ def _world_places(world: World, ports: PortRow) -> Places:
         ready_margins=np.array([record["ready"][1] for record in own]),
         clock_lag=own[0]["clock"][:1],
         causes=supervisor["causes"],
+        alarms=np.array([record["alarm"] for record in own]).reshape(-1, ALARM_SIZE),
     )
 
 

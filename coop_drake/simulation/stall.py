@@ -18,7 +18,7 @@ from coop_drake.laws.readiness import (
 )
 from coop_drake.simulation.telemetry import Sample
 from coop_drake.systems.governor_kernels import cell_margin
-from coop_drake.systems.hold_supervisor import ASKED, SILENT, TOLD
+from coop_drake.systems.hold_supervisor import ASKED, BRAKED, SILENT, TOLD
 
 PATIENCE_FACTOR = 10.0
 """A transition may take this many times its estimated time [-]: estimates are within a factor of two."""
@@ -52,7 +52,12 @@ def blocking_margin(plan: Plan, sample: Sample, position_tolerance: float) -> st
 
 def _causes_of(sample: Sample) -> str:
     """Return why the team is held, as a phrase."""
-    words = {TOLD: "it is told so", ASKED: "asks for it", SILENT: "is not heard"}
+    words = {
+        TOLD: "it is told so",
+        ASKED: "asks for it",
+        SILENT: "is not heard",
+        BRAKED: "lets the drives brake",
+    }
     names = ["", *(f"robot {k} " for k in range(len(sample.causes) - 1))]
     found = [name + words[cause] for name, cause in zip(names, sample.causes, strict=True) if cause]
     return ", ".join(found)

@@ -43,6 +43,8 @@ class Sample:
         held: Whether the team is held, 1 or 0.
         clock_lag: Lag of the funnels' clock since the cell was entered.
         causes: Why the team is held, as the hold supervisor shows it; empty where it cannot be.
+        alarms: What every robot's monitor of departures says, see ``DepartureMonitor``, shape (N, 3); (0, 3)
+            where there is none.
         arrived: Whether all robots report arrival.
     """
 
@@ -69,6 +71,7 @@ class Sample:
     held: float
     clock_lag: float
     causes: FloatArray
+    alarms: FloatArray
     arrived: bool
 
 
@@ -136,5 +139,6 @@ class Telemetry:
             held=held,
             clock_lag=lag,
             causes=at.causes,
+            alarms=at.alarms,
             arrived=bool(arrived),
         )

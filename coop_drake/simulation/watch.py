@@ -2,17 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
+import numpy as np
 from pydrake.systems.framework import Context, EventStatus
 
 from coop_drake.answers.plan import Plan
 from coop_drake.diagram import World
+from coop_drake.laws.departure import departing_name
+from coop_drake.plant import TeamPlant
 from coop_drake.simulation.invariants import Invariants, Margins
-from coop_drake.simulation.logged_ports import LoggedLoop
+from coop_drake.simulation.logged_ports import LoggedLoop, ReportingLoop
 from coop_drake.simulation.recorder import Recorder
-from coop_drake.simulation.stall import at_goal, blocking_margin, narrowest_funnel, patience
+from coop_drake.simulation.stall import (
+    PATIENCE_ALLOWANCE,
+    at_goal,
+    blocking_margin,
+    narrowest_funnel,
+    patience,
+)
 from coop_drake.simulation.telemetry import Sample, Telemetry
+from coop_drake.systems.hold_supervisor import ASKED, BRAKED
 
 
 class Watch:
@@ -45,6 +55,7 @@ class Watch:
         self._tolerance = position_tolerance
         self._last: Sample | None = None
         self._returns = False
+        self._asked_since: float | None = None
 
     @property
     def ended(self) -> bool:
@@ -64,6 +75,8 @@ class Watch:
             self._see_stop(sample, margins, self._loop.link.trouble)
         elif margins.violation and not (self._returns and self._still_returns(margins)):
             self.violation = margins.violation
+        elif (asking := self._beyond_holding(sample)) is not None:
+            self.violation = f"at t = {sample.time:.6g} s in cell {sample.cell}: {asking}"
         elif sample.arrived and at_goal(self._loop.plan, sample, self._tolerance):
             self.reached = True
         elif sample.time - sample.entry - sample.clock_lag > patience(self._loop.plan, sample.cell):
@@ -71,6 +84,29 @@ class Watch:
         if not self.ended:
             return None
         return EventStatus.ReachedTermination(self._loop.diagram, self.violation or "arrived")
+
+    def _beyond_holding(self, sample: Sample) -> str | None:
+        """Return why a robot's monitor ends the run, None where it does not.
+
+        The drives brake where a departure grows on. A loop of one block for all robots cannot be held. A team
+        that is held for long by its own monitors will not go on.
+        """
+        if isinstance(self._loop, ReportingLoop):
+            asking = np.flatnonzero(sample.alarms[:, 0]).tolist()
+        else:
+            asking = [k for k, cause in enumerate(sample.causes[1:]) if cause == ASKED]
+        braking = [k for k, cause in enumerate(sample.causes[1:]) if cause == BRAKED]
+        since = sample.time if self._asked_since is None else self._asked_since
+        self._asked_since = since if asking else None
+        team, plan = self._loop.team, self._loop.plan
+        if braking:
+            return f"{_names(team, braking)} lets the drives brake{_departing(team, plan, sample)}"
+        if asking and isinstance(self._loop, ReportingLoop):
+            return f"{_names(team, asking)} asks for a hold{_departing(team, plan, sample)}"
+        if asking and sample.time - since > PATIENCE_ALLOWANCE:
+            long = f"has asked for a hold since t = {since:.6g} s"
+            return f"{_names(team, asking)} {long}{_departing(team, plan, sample)}"
+        return None
 
     def _see_stop(self, sample: Sample, margins: Margins, trouble: str) -> None:
         """Watch a team whose drives brake for contacts, until it begins its cell anew or cannot go on."""
@@ -115,3 +151,17 @@ class Watch:
         estimate = self._loop.plan.transitions[sample.cell].estimated_time
         within = 1.0 if sample.arrived else min(0.99, (sample.time - sample.entry) / max(estimate, 1e-9))
         self._progress("simulating", (sample.cell + within) / len(self._loop.plan.cells))
+
+
+def _names(team: TeamPlant, robots: Sequence[int]) -> str:
+    return " and ".join(team.robots[k].name for k in robots)
+
+
+def _departing(team: TeamPlant, plan: Plan, sample: Sample) -> str:
+    """Return what departs the most from its nominal motion, as a clause; nothing where no monitor looks."""
+    if not sample.alarms.size:
+        return ""
+    k = int(np.argmax(sample.alarms[:, 1]))
+    robot, (_, share, check) = team.robots[k], sample.alarms[k].tolist()
+    what = departing_name(int(check), plan.joint_names[robot.q_slice])
+    return f": {what} departs {share:.3g} times as far as its level allows, as {robot.name} measures it"

@@ -6,6 +6,7 @@ from coop_drake.systems.block import Block
 from coop_drake.systems.blocked_bases import BlockedBases
 from coop_drake.systems.cell_planner import CellPlanner
 from coop_drake.systems.current_cell import CURRENT_CELL_SIZE, READY_SIZE
+from coop_drake.systems.departure_monitor import DepartureMonitor, MonitoredRobot
 from coop_drake.systems.disturbance_observer import DisturbanceObserver
 from coop_drake.systems.floor_friction import FloorFriction
 from coop_drake.systems.funnel_clock import CLOCK_SIZE, FunnelClock
@@ -43,6 +44,7 @@ __all__ = [
     "Block",
     "BlockedBases",
     "CellPlanner",
+    "DepartureMonitor",
     "DisturbanceObserver",
     "Exchange",
     "FloorFriction",
@@ -58,6 +60,7 @@ __all__ = [
     "LossyMeasurement",
     "MeasurementNoise",
     "MessageChannel",
+    "MonitoredRobot",
     "NominalAxes",
     "NominalGovernor",
     "NominalMotion",

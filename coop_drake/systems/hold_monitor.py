@@ -11,10 +11,12 @@ from coop_drake.laws.axis_table import ENERGY_BOUND, track_paced_row
 from coop_drake.systems.axis_laws import AxisLaw
 from coop_drake.systems.block import Block
 from coop_drake.systems.current_cell import CURRENT_CELL_SIZE, index_of
+from coop_drake.systems.departure_monitor import ALARM_SIZE
 from coop_drake.systems.funnel_clock import CLOCK_SIZE
 
 REQUEST_SIZE = 2
-"""Size of a request: 1 to be held, else 0 [-], and the number of the message [-], new for a new one."""
+"""Size of a request: 1 to be held, 2 where the drives shall brake, else 0 [-], and the number of the message
+[-], new for a new one."""
 
 RELEASE = 0.5
 """A request ends when all energies are below this share of the limit [-], so that noise does not
@@ -22,7 +24,7 @@ begin a second one at once."""
 
 
 class HoldMonitor(Block):
-    """Asks for a hold while an energy of its own is too large, its Delta E is negative, or it hears nothing.
+    """Asks for a hold while an energy is too large, Delta E negative, an alarm rings, or it hears nothing.
 
     ======= =================== ========== ====================================================== =====
     input   ``object_state``    6          pose and twist of L, angle unwrapped                   W
@@ -31,7 +33,8 @@ class HoldMonitor(Block):
     input   ``clock``           3          lag, pace and its derivative of the funnels' clock
     input   ``energy_margin``   1          Delta E [m^2/s^2]
     input   ``missed``          1          1 where it misses messages of the supervisor, else 0 [-]
-    output  ``hold_request``    2          1 to be held, else 0; the number of the message [-]
+    input   ``alarm``           3          what ``DepartureMonitor`` says; only with ``alarmed``
+    output  ``hold_request``    2          1 to be held, 2 for brakes, else 0; number of the message [-]
     ======= =================== ========== ====================================================== =====
 
     State: one discrete group, whether it asks now and how many times it has updated, every step or every
@@ -41,6 +44,7 @@ class HoldMonitor(Block):
         laws: Laws of the axes (theta, q_k), one for each cell of the plan.
         energy: Largest V of an axis over the bound with which its cell may be entered [-]; None to ask only
             where messages are missed.
+        alarmed: Whether a monitor of departures asks, too.
         period: Time between updates [s], None for every step.
         offset: Time of the first update [s].
     """
@@ -50,6 +54,7 @@ class HoldMonitor(Block):
         laws: Sequence[AxisLaw],
         energy: float | None,
         *,
+        alarmed: bool = False,
         period: float | None = None,
         offset: float = 0.0,
     ) -> None:
@@ -62,17 +67,20 @@ class HoldMonitor(Block):
         self._clock = self.DeclareVectorInputPort("clock", CLOCK_SIZE)
         self._margin = self.DeclareVectorInputPort("energy_margin", 1)
         self._missed = self.DeclareVectorInputPort("missed", 1)
+        self._alarm = self.DeclareVectorInputPort("alarm", ALARM_SIZE) if alarmed else None
         self.DeclareDiscreteState(np.zeros(REQUEST_SIZE))
         self.DeclareVectorOutputPort("hold_request", REQUEST_SIZE, self._write_request, {self.xd_ticket()})
         self.declare_update(self._judge, period, offset)
 
     def _judge(self, context: Context, discrete_state: DiscreteValues) -> EventStatus:
         asked, number = context.get_discrete_state_vector().value()
-        asks = bool(self._missed.Eval(context)[0] > 0.0)
+        asks = float(self._missed.Eval(context)[0] > 0.0)
         if self._energy is not None and not asks:
             limit = self._energy * (RELEASE if asked else 1.0)
-            asks = self._margin.Eval(context)[0] < 0.0 or self._largest_share(context) > limit
-        discrete_state.get_mutable_vector().SetFromVector([float(asks), number + 1.0])
+            asks = float(self._margin.Eval(context)[0] < 0.0 or self._largest_share(context) > limit)
+        if self._alarm is not None:
+            asks = max(asks, float(self._alarm.Eval(context)[0]))
+        discrete_state.get_mutable_vector().SetFromVector([asks, number + 1.0])
         return EventStatus.Succeeded()
 
     def _largest_share(self, context: Context) -> float:

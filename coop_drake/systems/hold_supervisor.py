@@ -5,11 +5,12 @@ from __future__ import annotations
 import numpy as np
 from pydrake.systems.framework import BasicVector, Context, DiscreteValues, EventStatus
 
+from coop_drake.laws.departure import ASKS
 from coop_drake.laws.hold import SETTLING_TIME
 from coop_drake.systems.block import Block
 from coop_drake.systems.hold_monitor import REQUEST_SIZE
 
-TOLD, ASKED, SILENT = 1.0, 2.0, 3.0
+TOLD, ASKED, SILENT, BRAKED = 1.0, 2.0, 3.0, 4.0
 """Causes of a hold."""
 
 
@@ -25,7 +26,8 @@ class HoldSupervisor(Block):
     output  ``paused``            1     1 while the funnels' clock does not run as usual, else 0: the
                                         cell must not be left [-]
     output  ``causes``            1 + N first the order (0, or 1 where the team is told to hold), then each
-                                        robot: 0 for no cause, 2 where it asks, 3 where it is not heard [-]
+                                        robot: 0 for no cause, 2 where it asks, 3 where it is not heard, 4
+                                        where it says that the drives shall brake [-]
     ======= ===================== ===== ================================================================
 
     State: one discrete group, updated at the start of every step, or every ``period``: the time at which the
@@ -62,7 +64,8 @@ class HoldSupervisor(Block):
             asks, number = port.Eval(context)
             if number != heard[k, 0]:
                 heard[k] = number, now
-            causes[1 + k] = ASKED if asks > 0.0 else SILENT if now - heard[k, 1] > self._silence else 0.0
+            silent = SILENT if now - heard[k, 1] > self._silence else 0.0
+            causes[1 + k] = BRAKED if asks > ASKS else ASKED if asks > 0.0 else silent
         if held and not causes.any():
             state[0] = now
         state[-1] += 1.0

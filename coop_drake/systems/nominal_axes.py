@@ -50,6 +50,7 @@ class NominalAxes(Block):
                                                 joints and rates of both
     output  ``object_ahead``         6          as ``nominal_object``, half a period and a lag later   W
     output  ``robot_ahead``          2 (3 + n)  as ``nominal_robot``, half a period and a lag later    W
+    output  ``nominal_axes``         2 (1 + n)  x^ and x^' of the axes (theta, q_k)
     output  ``pulled_axes``          1 + n      desired accelerations of the object's angle [rad/s^2], W
                                                 of the joints [rad/s^2 or m/s^2], with the pull
     ======= ======================== ========== ====================================================== =====
@@ -83,6 +84,7 @@ class NominalAxes(Block):
             ("nominal_robot", 2 * (2 + axes), self._write_robot, {of_robot}),
             ("object_ahead", 6, self._write_object_ahead, {of_object, asked}),
             ("robot_ahead", 2 * (2 + axes), self._write_robot_ahead, {of_robot, asked}),
+            ("nominal_axes", 2 * axes, self._write_axes, set()),
             ("pulled_axes", axes, self._write_pulled, {of_object, of_robot, asked}),
         ):
             self.DeclareVectorOutputPort(name, size, calc, read | {nominal})
@@ -126,6 +128,9 @@ class NominalAxes(Block):
         shown = output.get_mutable_value()
         shown[:] = self._robot.Eval(context)
         self._place(states, self._motion.mounting, shown)
+
+    def _write_axes(self, context: Context, output: BasicVector) -> None:
+        output.SetFromVector(self._states(context)[:2].ravel())
 
     def _write_pulled(self, context: Context, output: BasicVector) -> None:
         states, law, seen = self._states(context), self._law.Eval(context), self._object.Eval(context)

@@ -8,9 +8,11 @@ import numpy as np
 from pydrake.systems.framework import BasicVector, Context, DiscreteValues, EventStatus
 
 from coop_drake.compiled import prepared
+from coop_drake.laws.departure import quiet_margin
 from coop_drake.systems.axis_laws import AxisLaw
 from coop_drake.systems.block import NUMBER, VECTOR, Block
 from coop_drake.systems.current_cell import CURRENT_CELL_SIZE, READY_SIZE, index_of
+from coop_drake.systems.departure_monitor import ALARM_SIZE
 from coop_drake.systems.nominal_kernels import NOMINAL_SIZE
 from coop_drake.systems.ready_kernels import ready_conditions, robot_ready, robot_ready_along
 from coop_drake.systems.reference_governor import GovernedCell
@@ -29,10 +31,12 @@ class ReadyMonitor(Block):
     input   ``governor_position``  2          p_G as the robot keeps it [m]                          W
     input   ``current_cell``       2          index of the current cell, time of its entry [-, s]
     input   ``nominal``            6          what ``NominalGovernor`` shows; only with ``nominal``
+    input   ``alarm``              3          what ``DepartureMonitor`` says; only with ``nominal``
     output  ``ready``              2          index of the current cell, signed margin [-]
     ======= ====================== ========== ====================================================== =====
 
-    The report is all that a robot sends to others: whether it is ready, and for which cell.
+    The report is all that a robot sends to others: whether it is ready, and for which cell. With ``nominal``
+    a robot is ready where its nominal motion may enter the next cell and its monitor is quiet.
 
     No state, unless rates are averaged: then one discrete group, updated every ``period`` in the last cell,
     the rates of the last samples, which count as ``MOVING`` before there are so many.
@@ -89,6 +93,7 @@ class ReadyMonitor(Block):
         self._governor = self.DeclareVectorInputPort("governor_position", 2)
         self._current = self.DeclareVectorInputPort("current_cell", CURRENT_CELL_SIZE)
         self._nominal = self.DeclareVectorInputPort("nominal", NOMINAL_SIZE) if nominal else None
+        self._alarm = self.DeclareVectorInputPort("alarm", ALARM_SIZE) if nominal else None
         self._averaged = averaged
         if averaged:
             self.DeclareDiscreteState(np.full(averaged * (3 + n), MOVING))
@@ -124,3 +129,5 @@ class ReadyMonitor(Block):
             self._governor.Eval(context),
             *led,
         )
+        if self._alarm is not None:
+            report[1] = quiet_margin(report[1], self._alarm.Eval(context)[0])

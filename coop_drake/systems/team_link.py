@@ -10,11 +10,12 @@ from pydrake.systems.framework import BasicVector, Context, DiscreteValues
 
 from coop_drake.systems.block import Block
 from coop_drake.systems.current_cell import CURRENT_CELL_SIZE, READY_SIZE
+from coop_drake.systems.departure_monitor import ALARM_SIZE
 from coop_drake.systems.funnel_clock import CLOCK_SIZE
 from coop_drake.tree.pose import FloatArray
 
 
-def robot_record(joints: int, *, holds: bool) -> dict[str, int]:
+def robot_record(joints: int, *, holds: bool, monitored: bool = False) -> dict[str, int]:
     """Return the names and sizes of the outputs of a robot with n joints that are logged."""
     return {
         "governor_position": 2,
@@ -24,6 +25,7 @@ def robot_record(joints: int, *, holds: bool) -> dict[str, int]:
         "hand_command": 6,
         "ready": READY_SIZE,
         "clock": CLOCK_SIZE if holds else 0,
+        "alarm": ALARM_SIZE if monitored else 0,
     }
 
 

@@ -112,7 +112,7 @@ def test_ports_of_the_block():
     loop = build_sampled_loop(transport)
     inputs, outputs = port_sizes(loop.controllers)
     assert inputs == {"team_state": 2 * (3 + 2)}
-    assert outputs == {"efforts": 3 * 2 + 2, "telemetry": 3 + 17 * 2 + 2 * 4}
+    assert outputs == {"efforts": 3 * 2 + 2, "telemetry": 3 + 20 * 2 + 2 * 4}
     loop.release()
 
 

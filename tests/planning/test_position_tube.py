@@ -110,7 +110,7 @@ def test_what_does_not_hold_is_said(name):
 
 def test_slower_motion_is_chosen_where_a_force_is_limited():
     scenario, plan = small_problem()
-    budget = replace(BUDGET, base_force=150.0)
+    budget = replace(BUDGET, base_force=100.0)
     found = fit_position(planning_problem(scenario), plan, ScheduledGains(), budget)
     assert isinstance(found, Plan)
     assert found.tube.speed < 1.0

@@ -38,7 +38,14 @@ def stepped(system, context, steps):
 def test_ports():
     assert port_sizes(block()) == (
         {"object_state": 6, "robot_state": 10, "axis_acceleration": 3},
-        {"nominal_object": 6, "nominal_robot": 10, "object_ahead": 6, "robot_ahead": 10, "pulled_axes": 3},
+        {
+            "nominal_object": 6,
+            "nominal_robot": 10,
+            "object_ahead": 6,
+            "robot_ahead": 10,
+            "nominal_axes": 6,
+            "pulled_axes": 3,
+        },
     )
 
 

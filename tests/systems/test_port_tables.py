@@ -54,9 +54,8 @@ def leaves(system):
 
 @pytest.fixture(scope="module")
 def blocks():
-    """One of each block: from loops with a tube, one that is sampled, and one whose robots are separate."""
-    own, (scenario, plan) = small_problem("base"), tubed_problem()
-    axes = tubed_problem(WITH_AXES)
+    """One of each block: from loops with a budget, one that is sampled, and one whose robots are separate."""
+    own, (scenario, plan) = small_problem("base"), tubed_problem(WITH_AXES)
     tubed, hold = (scenario, plan, build_maps(plan)), Control(hold=Hold(at=(1.0,)))
     everything = {"deployment": EVERYTHING, "control": Control(predictor=True, observer=True, hold=Hold())}
     separate = {"plant": PlantSettings(grasps="constraints")}
@@ -64,7 +63,6 @@ def blocks():
     for (scenario, plan, maps), blocks, changes in (
         (tubed, "named", {"control": hold}),
         ((*own, small_maps()), "fused", {"control": hold}),
-        ((*axes, build_maps(axes[1])), "named", {"control": hold}),
         ((*own, small_maps()), "named", everything),
         ((*own, small_maps()), "named", separate),
     ):
@@ -111,7 +109,7 @@ def test_only_switches_jumps_holds_what_is_predicted_and_what_models_failures_ar
     failures = {"Interruption", "LaggingEffort", "LossyMeasurement", "MessageChannel"}
     holds = {"FunnelClock", "HoldMonitor", "HoldReceiver", "HoldSupervisor"}
     laws = {"CellPlanner", "AxisPpc", "TeamController", "StatePredictor", "NominalAxes", "NominalGovernor"}
-    assert remembering == laws | holds | failures | {"TeamLink"}
+    assert remembering == laws | holds | failures | {"TeamLink", "DepartureMonitor"}
 
 
 @pytest.mark.parametrize("name", BLOCKS)

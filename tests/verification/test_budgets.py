@@ -78,9 +78,47 @@ def test_a_larger_budget_is_refused(plan, name):
     assert "tolerance" in refusal.value.where or refusal.value.where == "axis_tracking"
 
 
-def test_old_reports_of_nominal_motions_change_nothing_here(plan):
-    """A nominal motion that is at rest stays there: the sets of axes do not grow while a report travels."""
-    assert check_budget(replace(plan, budget=replace(plan.budget, report_age=0.2))).count > 0
+def test_old_reports_leave_monitors_more_to_see_and_the_sets_of_axes_as_they_are(plan):
+    """A nominal motion that is at rest stays there: its sets do not grow while a report travels."""
+    old, T, angle = replace(plan.budget, report_age=0.2), plan.budget.period, plan.budget.angle_noise
+    time = plan.budget.delay + 0.2 + T
+    reserve = angle + plan.budget.rate_noise * time + 0.5 * plan.budget.acceleration_error * time**2
+    with pytest.raises(RefusalError) as refusal:
+        check_budget(replace(plan, budget=old))
+    assert refusal.value.where == "alarms.axis_reserve[0]"
+    alarms = replace(plan.alarms, axis_reserve=np.full(plan.start.size - 2, reserve))
+    assert check_budget(replace(plan, budget=old, alarms=alarms)).count > 0
+
+
+@pytest.mark.parametrize("factor", [0.99, 1.01])
+def test_another_reserve_is_refused(plan, factor):
+    other = replace(plan.alarms, axis_reserve=plan.alarms.axis_reserve * [1.0, factor, 1.0])
+    with pytest.raises(RefusalError) as refusal:
+        check_budget(replace(plan, alarms=other))
+    assert refusal.value.where == "alarms.axis_reserve[1]"
+
+
+def test_levels_that_are_missing_or_too_few_are_refused(plan):
+    few = with_transition(plan, 0, tolerance=replace(plan.transitions[0].tolerance, alarm=np.ones(1)))
+    short = replace(plan, alarms=replace(plan.alarms, axis_reserve=np.ones(1)))
+    for altered, where in (
+        (replace(plan, alarms=None), "alarms"),
+        (few, "transitions[0].tolerance.alarm"),
+        (short, "alarms.axis_reserve"),
+    ):
+        with pytest.raises(RefusalError) as refusal:
+            check_budget(altered)
+        assert refusal.value.where == where
+
+
+def test_an_axis_that_comes_too_near_its_funnel_for_its_monitor_is_refused(plan):
+    """Less distance than a robot's noise and the reserve; all that a plan says of it else is true."""
+    stated = plan.transitions[0].tolerance
+    near = stated.distance.copy()
+    near[0] = 0.99 * (plan.budget.angle_noise * plan.budget.single_noise + plan.alarms.axis_reserve[0])
+    with pytest.raises(RefusalError, match="its monitor needs") as refusal:
+        check_budget(with_transition(plan, 0, tolerance=replace(stated, distance=near)))
+    assert refusal.value.where == "transitions[0].tolerance.distance[0]"
 
 
 def with_transition(plan, k, **changes):
@@ -92,7 +130,7 @@ def with_transition(plan, k, **changes):
 ALTERED = {
     "entry_lower": 1.002, "entry_upper": -1.002, "entry_rate_lower": 0.9, "entry_rate_upper": 0.9,
     "entry_acceleration": 0.9, "distance": 1.05, "acceleration": 0.95, "settled": 0.95,
-    "settled_rate": 0.95, "departure": 0.99, "rate_departure": 0.99,
+    "settled_rate": 0.95, "departure": 0.99, "rate_departure": 0.99, "alarm": 0.99, "rate_alarm": 1.01,
 }  # fmt: skip
 
 

@@ -136,9 +136,39 @@ def test_an_object_that_may_be_faster_than_its_limit_is_refused():
 def test_a_tube_without_a_budget_and_a_budget_without_a_tube_are_refused():
     assert refusal(replace(plan(), tube=None)) == "tube"
     assert refusal(replace(plan(), budget=None)) == "tube"
-    assert refusal(replace(plan(), budget=None, tube=None)) == "transitions[0].governed"
+    assert refusal(replace(plan(), budget=None, tube=None)) == "alarms"
+    assert refusal(replace(plan(), budget=None, tube=None, alarms=None)) == "transitions[0].governed"
     bare = tuple(replace(transition, governed=None) for transition in plan().transitions)
-    assert check_position(replace(plan(), budget=None, tube=None, transitions=bare), TOLERANCE) == []
+    without = replace(plan(), budget=None, tube=None, alarms=None, transitions=bare)
+    assert check_position(without, TOLERANCE) == []
+
+
+@pytest.mark.parametrize("factor", [0.999, 1.001])
+@pytest.mark.parametrize("name", ["position", "velocity", "grasp", "turn"])
+def test_another_level_of_a_monitor_is_refused(name, factor):
+    seen = replace(plan(), budget=replace(plan().budget, grasp_noise=0.01, turn_noise=0.006))
+    alarms = replace(plan().alarms, grasp=0.01, turn=0.006)
+    assert len(check_position(replace(seen, alarms=alarms), TOLERANCE)) == 3
+    other = replace(alarms, **{name: factor * getattr(alarms, name)})
+    assert refusal(replace(seen, alarms=other)) == f"alarms.{name}"
+    if name in ("grasp", "turn"):
+        assert refusal(replace(seen, alarms=replace(alarms, **{name: None}))) == f"alarms.{name}"
+        assert refusal(replace(plan(), alarms=alarms)) == "alarms.grasp"
+
+
+def test_levels_must_be_there_and_leave_room_in_the_cells():
+    assert refusal(replace(plan(), alarms=None)) == "alarms"
+    assert refusal(replace(plan(), alarms=replace(plan().alarms, axis_reserve=np.ones(3)))) == (
+        "alarms.axis_reserve"
+    )
+    later = replace(plan(), budget=replace(plan().budget, report_age=plan().budget.report_age + 0.005))
+    assert refusal(later) == "transitions[0].governed"
+    for k, transition in enumerate(plan().transitions):
+        away = transition.governed.boundary.distance(plan().cells[k].tidied.boundary)
+        noise = (1.0 + BUDGET.single_noise) * BUDGET.position_noise
+        time = BUDGET.delay + BUDGET.report_age + BUDGET.period
+        grown = BUDGET.velocity_noise * time + 0.5 * BUDGET.acceleration_error * time**2
+        assert away >= plan().tube.radius + noise + grown
 
 
 def test_a_file_keeps_all_of_it(tmp_path):

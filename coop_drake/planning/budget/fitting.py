@@ -12,6 +12,7 @@ from coop_drake.answers.problem import PlanningProblem
 from coop_drake.laws import ScheduledGains
 from coop_drake.laws.axis_table import LEAVING_TIME, REST_RATE, REST_REACH, axis_table
 from coop_drake.laws.gains import IDEAL_AGE, RestCondition
+from coop_drake.planning.budget.alarms import axis_noises
 from coop_drake.planning.budget.axis_departure import SLACK, best_loop
 from coop_drake.planning.budget.coupling import cell_couplings
 from coop_drake.planning.budget.transitions import (
@@ -64,7 +65,7 @@ def fit_budget(
     if isinstance(found, UnprovedTransition):
         return found
     fitted = tuple(
-        _stated(plans[passed.choice].transitions[k], passed, factors[passed.choice])
+        _stated(plans[passed.choice].transitions[k], passed, factors[passed.choice], budget)
         for k, passed in enumerate(found)
     )
     return replace(plans[0], transitions=fitted, budget=budget, axis_tracking=loop.tracking)
@@ -76,18 +77,19 @@ def _factors(gain_set: ScheduledGains, budget: Budget) -> list[float]:
     return [age / gain_set.age * factor for factor in AGE_FACTORS]
 
 
-def _stated(transition: Transition, passed: ProvedTransition, factor: float) -> Transition:
+def _stated(transition: Transition, passed: ProvedTransition, factor: float, budget: Budget) -> Transition:
     """Return a transition with what it states: its condition of rest, and the sets of its axes."""
     table = passed.table
     rest = RestCondition(
         float(table[0, LEAVING_TIME]), table[:, REST_REACH].copy(), table[:, REST_RATE].copy()
     )
     gains = replace(transition.gains, rest=rest)
-    return replace(transition, gains=gains, tolerance=_tolerance(factor, passed))
+    return replace(transition, gains=gains, tolerance=_tolerance(factor, passed, budget))
 
 
-def _tolerance(factor: float, passed: ProvedTransition) -> Tolerance:
+def _tolerance(factor: float, passed: ProvedTransition, budget: Budget) -> Tolerance:
     entries, every = passed.entries, passed.sets
+    noise, rate_noise = axis_noises(budget, len(every))
     return Tolerance(
         age_factor=factor,
         entry_lower=np.array([entry.lower for entry in entries]),
@@ -101,5 +103,7 @@ def _tolerance(factor: float, passed: ProvedTransition) -> Tolerance:
         settled_rate=np.array([(1.0 + SLACK) * sets.settled_rate for sets in every]),
         departure=passed.departure,
         rate_departure=passed.rate_departure,
+        alarm=passed.departure + noise,
+        rate_alarm=passed.rate_departure + rate_noise,
         entry_parts=tuple(sets.parts for sets in every),
     )

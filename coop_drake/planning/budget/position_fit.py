@@ -1,7 +1,8 @@
 """A plan whose position holds under a budget: gains of its loop, and cells without their outer strip.
 
-The object stays within r of its nominal motion, which the governor keeps in a region whose points are at
-least r from the boundary of the cell. Targets, paths and clearances are chosen again in these regions.
+The object stays within r of its nominal motion, which the governor keeps in a region whose points are so far
+from the boundary of the cell that monitors see in time whether it does. Targets, paths and clearances are
+chosen again in these regions.
 """
 
 from __future__ import annotations
@@ -26,6 +27,7 @@ from coop_drake.geometry.parts import component_at, parts_of
 from coop_drake.geometry.passage import pole
 from coop_drake.geometry.tidy import tidy_cell
 from coop_drake.laws import ScheduledGains
+from coop_drake.planning.budget.alarms import alarms_of, position_room
 from coop_drake.planning.budget.position_tube import PositionGains, position_tubes
 from coop_drake.planning.execution.estimate import plan_time, timed
 from coop_drake.planning.execution.transitions import find_route
@@ -41,11 +43,11 @@ SOFTER = (1.0, 0.6, 0.35)
 QUICK = 1.0
 """With at least this largest speed no softer governor is tried [m/s]: it would hardly be quicker."""
 
-TRACKING_STIFFNESSES = (50.0, 100.0, 150.0, 250.0, 400.0)
+TRACKING_STIFFNESSES = (50.0, 100.0, 150.0, 250.0, 400.0, 600.0)
 """K_t that are tried [1/s^2]; the narrowest tube is taken. Stiffer loops follow the noise more than they
 narrow the tube."""
 
-TRACKING_DAMPINGS = (1.4, 2.0)
+TRACKING_DAMPINGS = (1.4, 1.7, 2.0)
 """zeta_t over the root of K_t that are tried [-]: 2 is critical damping, 1.4 a damping ratio of 0.7.
 Which has the narrower tube depends on how noisy velocities are beside positions."""
 
@@ -64,7 +66,7 @@ SMALLEST_SHARE = 0.05
 """Share of the goal's tolerance that must be left for the nominal motion to arrive in [-]."""
 
 GAP = 1e-6
-"""The strip is wider than r by this [m], more than rounding."""
+"""The strip is wider than its monitors need by this [m], more than rounding."""
 
 
 @dataclass(frozen=True)
@@ -117,30 +119,44 @@ def unproved_position(
     slowest = []
     for share in SOFTER:
         tubes = _tubes(share * stiffest, gain_set, budget)
-        limits = [_not_allowed(tube, budget, problem, plan) for tube in tubes]
-        if None in limits:
+        found = [_narrowest_allowed(of_speed, budget, problem, plan) for of_speed in tubes]
+        limits = [one for one in found if isinstance(one, UnprovedPosition)]
+        if len(limits) < len(found):
             return None
         slowest += limits[-1:]
-    found = slowest[0] if slowest else None
-    return replace(found or _UNSTABLE, whatever_cells=True)
+    return replace(slowest[0] if slowest else _UNSTABLE, whatever_cells=True)
 
 
 def _fastest(
     problem: PlanningProblem, plan: Plan, gain_set: ScheduledGains, budget: Budget, stiffness: float
 ) -> Plan | UnprovedPosition:
-    """Return a plan with one K for all transitions, and the largest speed of p_G that holds."""
-    uniform = _with_stiffness(plan, stiffness, gain_set)
+    """Return a plan with one K for all transitions, and a speed of p_G that is quicker than a slower one.
+
+    Slow motions have narrow tubes, and so wide regions, in which p_G keeps its speed.
+    """
+    uniform, best = _with_stiffness(plan, stiffness, gain_set), None
     found: Plan | UnprovedPosition = _UNSTABLE
-    for tube in _tubes(stiffness, gain_set, budget):
-        found = _not_allowed(tube, budget, problem, uniform) or _within(problem, uniform, tube)
-        if isinstance(found, Plan):
-            return timed(replace(found, budget=budget))
-    return found  # of the slowest motion, which has the narrowest tube
+    for tubes in _tubes(stiffness, gain_set, budget):
+        tube = _narrowest_allowed(tubes, budget, problem, uniform)
+        if isinstance(tube, UnprovedPosition):
+            found = tube
+            continue
+        found = _within(problem, uniform, tube, position_room(budget, tube.radius))
+        if isinstance(found, UnprovedPosition):
+            continue
+        alarms = alarms_of(budget, tube, plan.start.size - 2)
+        found = timed(replace(found, budget=budget, alarms=alarms))
+        if best is not None and plan_time(best) <= plan_time(found):
+            break
+        best = found
+    return best or found  # of the slowest motion, which has the narrowest tube
 
 
 @lru_cache(maxsize=16)
-def _tubes(stiffness: float, gain_set: ScheduledGains, budget: Budget) -> tuple[PositionTube, ...]:
-    """Return the narrowest tube for each speed of p_G with which the loop is stable.
+def _tubes(
+    stiffness: float, gain_set: ScheduledGains, budget: Budget
+) -> tuple[tuple[PositionTube, ...], ...]:
+    """Return the tubes of all gains for each speed of p_G with which a loop is stable, the narrowest first.
 
     They are needed again where the axes have been fitted.
     """
@@ -153,7 +169,16 @@ def _tubes(stiffness: float, gain_set: ScheduledGains, budget: Budget) -> tuple[
     ]
     stable = [tube for tube in position_tubes(choices, budget) if tube is not None]
     of_speed = ([tube for tube in stable if tube.speed == speed] for speed in SPEEDS)
-    return tuple(min(tubes, key=lambda tube: tube.radius) for tubes in of_speed if tubes)
+    return tuple(tuple(sorted(tubes, key=lambda tube: tube.radius)) for tubes in of_speed if tubes)
+
+
+def _narrowest_allowed(
+    tubes: Sequence[PositionTube], budget: Budget, problem: PlanningProblem, plan: Plan
+) -> PositionTube | UnprovedPosition:
+    """Return the narrowest tube that is allowed, as stiff loops take large forces; or why none is."""
+    found = _not_allowed(tubes[0], budget, problem, plan)
+    allowed = (tube for tube in tubes if _not_allowed(tube, budget, problem, plan) is None)
+    return tubes[0] if found is None else next(allowed, found)
 
 
 def _not_allowed(
@@ -188,16 +213,23 @@ def _with_stiffness(plan: Plan, stiffness: float, gain_set: ScheduledGains) -> P
     return replace(plan, transitions=transitions)
 
 
-def _within(problem: PlanningProblem, plan: Plan, tube: PositionTube) -> Plan | UnprovedPosition:
-    """Return a plan whose regions, targets and paths leave room for the tube; or where there is none."""
+def _within(problem: PlanningProblem, plan: Plan, tube: PositionTube, room: float) -> Plan | UnprovedPosition:
+    """Return a plan whose regions, targets and paths leave room for the tube; or where there is none.
+
+    Args:
+        problem: What was asked.
+        plan: The plan.
+        tube: The tube.
+        room: How far the object may be off its nominal position before its monitors see it [m].
+    """
     regions, targets = [], []
-    strips = _grown([cell.tidied for cell in plan.cells], np.array(-(tube.radius + GAP)))
+    strips = _grown([cell.tidied for cell in plan.cells], np.array(-(room + GAP)))
     entry: FloatArray = plan.start[:2]
     for k, transition in enumerate(plan.transitions):
         region, last = component_at(strips[k], Point(entry)), k + 1 == len(plan.cells)
         target = transition.target if last else _target(region, strips[k + 1], transition)
         if target is None or not region.contains(Point(target)):
-            return _no_room(k, tube)
+            return _no_room(k, tube, room)
         regions.append(region)
         targets.append(target)
         entry = target
@@ -207,13 +239,13 @@ def _within(problem: PlanningProblem, plan: Plan, tube: PositionTube) -> Plan | 
         try:
             tidied = regions[k] if is_tidy else tidy_cell(regions[k], (entries[k], targets[k]))
         except GeometryError:
-            return _no_room(k, tube)
+            return _no_room(k, tube, room)
         cells.append(replace(plan.cells[k], tidied=tidied))
     transitions = []
     for k, transition in enumerate(plan.transitions):
         made = _routed(problem, cells[k : k + 2], entries[k], targets[k], transition, k)
         if made is None:
-            return _no_room(k, tube)
+            return _no_room(k, tube, room)
         transitions.append(made)
     return replace(plan, transitions=tuple(transitions), tube=tube)
 
@@ -234,10 +266,10 @@ def _are_tidy(regions: Sequence[Polygon], plan: Plan) -> NDArray[np.bool_]:
     return np.asarray(shapely.area(regions) - shapely.area(opened) < 2.0 * depth * depth)
 
 
-def _no_room(k: int, tube: PositionTube) -> UnprovedPosition:
+def _no_room(k: int, tube: PositionTube, room: float) -> UnprovedPosition:
     return UnprovedPosition(
-        f"in transition {k} the object may depart from its nominal motion by {1e3 * tube.radius:.1f} mm, "
-        "more than the cell leaves"
+        f"in transition {k} the object may depart from its nominal motion by {1e3 * tube.radius:.1f} mm, and "
+        f"by {1e3 * room:.1f} mm before its monitors see that it departs farther, more than the cell leaves"
     )
 
 

@@ -17,6 +17,7 @@ from coop_drake.laws.axis_table import (
 )
 from coop_drake.laws.readiness import EROSION
 from coop_drake.laws.sampling import whole_periods
+from coop_drake.planning.budget.alarms import least_distance
 from coop_drake.planning.budget.axis_departure import SLACK, AxisLoop
 from coop_drake.planning.budget.axis_sets import AxisSets, Entry, axis_sets
 from coop_drake.planning.budget.axis_tube import AxisConditions
@@ -140,9 +141,12 @@ def _attempt(
     found = Departures(*((1.0 + OTHERWISE) * one for one in found))
     departure, rate_departure, push = (one.max(axis=0) for one in found)
     spare = np.array([(1.0 - SLACK) * sets.spare(found.position[:, i]) for i, sets in enumerate(every)])
+    needed = least_distance(budget, len(every))
     for axis, sets in enumerate(every):
         if not spare[axis] > 0.0:
             return UnprovedTransition(k, axis, "may leave its funnel")
+        if not spare[axis] > needed[axis]:
+            return UnprovedTransition(k, axis, "may leave its funnel before its monitor sees it")
         if not (1.0 + SLACK) * sets.fastest(found.rate[:, axis], T) < table[axis, RATE_LIMIT]:
             return UnprovedTransition(k, axis, "may exceed the limit of its rate")
         if not (1.0 + SLACK) * sets.acceleration + push[axis] <= table[axis, ACCELERATION_LIMIT]:

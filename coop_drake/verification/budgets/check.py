@@ -18,6 +18,7 @@ from coop_drake.answers.plan import Plan, Transition
 from coop_drake.errors import RefusalError
 from coop_drake.tree import ComponentTree
 from coop_drake.tree.pose import FloatArray, IntArray
+from coop_drake.verification.budgets.alarms import alarms_of, check_axis_alarms
 from coop_drake.verification.budgets.axis_departure import Loop, departures, loop_of, resting
 from coop_drake.verification.budgets.axis_law import Axes, axes_of
 from coop_drake.verification.budgets.entering import entering, first_rest
@@ -68,6 +69,7 @@ def check_budget(plan: Plan, tree: ComponentTree | None = None) -> Check | None:
         motion, entry = _check_motion(plan, k, stated, f"{where}.tolerance")
         away, entered = departures(loop, terms[k], motion.moving, entered, motion.leaving)
         _check_departures(transition, motion, away, f"{where}.tolerance")
+        check_axis_alarms(alarms_of(plan), stated, plan.budget, f"{where}.tolerance")
         smallest, count = min(smallest, float(stated.distance.min())), count + stated.distance.size
     return Check(
         "axes stay in their funnels under the budget", count, smallest, "rad or m to a funnel's bound"

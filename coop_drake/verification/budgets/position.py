@@ -9,6 +9,7 @@ from coop_drake.answers.budget import Budget
 from coop_drake.answers.plan import Plan
 from coop_drake.answers.position_tube import PositionTube
 from coop_drake.errors import RefusalError
+from coop_drake.verification.budgets.alarms import alarms_of, check_alarms
 from coop_drake.verification.budgets.position_loop import position_bounds
 from coop_drake.verification.checks import Check
 
@@ -29,14 +30,15 @@ def check_position(plan: Plan, position_tolerance: float) -> list[Check]:
         RefusalError: Names the entry, and what the budget gives.
     """
     if plan.budget is None:
-        for where, stated in (("tube", plan.tube), *_regions(plan)):
+        for where, stated in (("tube", plan.tube), ("alarms", plan.alarms), *_regions(plan)):
             if stated is not None:
                 raise RefusalError(where, "is stated, but the plan has no budget")
         return []
     if plan.tube is None:
         raise RefusalError("tube", "is missing, but the plan has a budget")
     _check_tube(plan, plan.tube, plan.budget)
-    least = min(_check_region(plan, k, plan.tube.radius) for k in range(len(plan.cells)))
+    room = check_alarms(alarms_of(plan), plan.tube, plan.budget)
+    least = min(_check_region(plan, k, room) for k in range(len(plan.cells)))
     for k in range(len(plan.cells)):
         _check_path(plan, k)
     checks = [
@@ -77,18 +79,26 @@ def _check_tube(plan: Plan, tube: PositionTube, budget: Budget) -> None:
             raise RefusalError(f"tube.{name}", f"is {stated:.6g}; the budget gives up to {value:.6g}")
 
 
-def _check_region(plan: Plan, k: int, radius: float) -> float:
-    """Check the governed set of a transition; return by how much more than r it is inside its cell [m]."""
+def _check_region(plan: Plan, k: int, room: float) -> float:
+    """Check the governed set of a transition; return by how much more than needed it is inside its cell [m].
+
+    Args:
+        plan: The plan.
+        k: The transition.
+        room: How far the object may be off its nominal position while no report tells of it [m].
+    """
     cell, region, where = plan.cells[k].tidied, plan.transitions[k].governed, f"transitions[{k}].governed"
     if region is None:
         raise RefusalError(where, "is missing, but the plan has a budget")
     if not cell.contains(region):
         raise RefusalError(where, "leaves its cell")
     away = float(shapely.distance(region.boundary, cell.boundary))
-    if not away >= radius:
-        finding = f"comes within {away:.6g} m of the cell's boundary; the tube's radius is {radius:.6g} m"
+    if not away >= room:
+        finding = (
+            f"comes within {away:.6g} m of the cell's boundary; the tube and its monitor need {room:.6g} m"
+        )
         raise RefusalError(where, finding)
-    return away - radius
+    return away - room
 
 
 def _check_path(plan: Plan, k: int) -> None:

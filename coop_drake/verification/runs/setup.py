@@ -39,7 +39,7 @@ class RunSetup:
             bodies, so that the equations of motion hold to rounding.
         can_be_held: Whether the scenario knows holds.
         one_hold: Whether all robots hear at once that they are held, and not.
-        one_clock: Whether all robots have the same time since a cell was entered.
+        one_clock: Whether all robots have the same time since a cell was entered, but for holds.
         alike: Whether they also compute at the same instants, so that all have the same nominal motions.
         grasps: Every robot's grasp in L, shape (N, 2) [m].
         bodies: Mass properties of all bodies.

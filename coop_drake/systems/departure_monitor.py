@@ -1,0 +1,138 @@
+"""One robot's monitor: whether what it measures is farther from its nominal motion than its plan allows."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from pydrake.systems.framework import BasicVector, Context, DiscreteValues, EventStatus
+
+from coop_drake.compiled import prepared
+from coop_drake.laws.departure import alarm_at, axis_level, largest_departure
+from coop_drake.laws.robot_dynamics import estimate_object
+from coop_drake.systems.block import VECTOR, Block
+from coop_drake.systems.current_cell import CURRENT_CELL_SIZE, index_of
+from coop_drake.systems.nominal_kernels import NOMINAL_SIZE
+from coop_drake.tree.pose import FloatArray
+
+ALARM_SIZE = 3
+"""Size of what a monitor says: 0 while it is quiet, 1 where it asks for a hold, 2 where the drives shall
+brake; the largest departure over its level; and the number of this level [-]."""
+
+LONG_AGO = -1e9
+"""When something was above its level the last time, before anything was [s]."""
+
+
+@dataclass(frozen=True)
+class MonitoredRobot:
+    """What a monitor needs to know.
+
+    Attributes:
+        chain: From the robot's base to its end effector.
+        p_LE: The grasp in L, shape (2,) [m].
+        mounting: See ``place_on_axes``, shape (1 + n,).
+        levels: Of position, velocity, grasp and angle of the base, infinite where there is none, shape (4,).
+        axis_alarms: Of the axes (theta, q_k) in every cell, and of their rates, shape (cells, 2, 1 + n), or
+            (cells, 2, 0) where they have no nominal motion.
+        axis_reserve: What must be left of an axis' distance to its funnel's bounds, shape (1 + n,) or (0,).
+        start: (x, y, theta, q_k) at the beginning, shape (3 + n,).
+        period: T [s].
+        measurement_periods: Age of the measurements in periods [-].
+        offset: Time of the first computation [s].
+    """
+
+    chain: FloatArray
+    p_LE: FloatArray  # noqa: N815
+    mounting: FloatArray
+    levels: FloatArray
+    axis_alarms: FloatArray
+    axis_reserve: FloatArray
+    start: FloatArray
+    period: float
+    measurement_periods: int
+    offset: float = 0.0
+
+
+class DepartureMonitor(Block):
+    """Compares a robot's raw measurements with its nominal motion when they were made, ``laws/departure.py``.
+
+    ======= ================ ========== ============================================================== =====
+    input   ``robot_state``  2 (3 + n)  z_k and its rate as measured, not predicted                    W
+    input   ``object_pose``  3          pose of L as measured, not predicted                           W
+    input   ``nominal``      6          what ``NominalGovernor`` shows; only p^ and p^' are read       W
+    input   ``nominal_axes`` 2 (1 + n)  x^ and x^' of the axes (theta, q_k); only where axes have such a
+                                        motion
+    input   ``funnels``      2 (1 + n)  lower and upper bounds of the axes; likewise [rad or m]
+    input   ``current_cell`` 2          index of the current cell, time of its entry [-, s]
+    output  ``alarm``        3          0, 1 for a hold or 2 for brakes; the largest departure over its
+                                        level, and the number of this level [-]
+    ======= ================ ========== ============================================================== =====
+
+    State: one discrete group, updated every period: when something was above its level the last time, then
+    p^, p^', x^, x^' and the levels of the axes and of their rates in the last m samples, m being the age of
+    measurements in periods, the latest first.
+    """
+
+    def __init__(self, robot: MonitoredRobot) -> None:
+        super().__init__()
+        self._robot, self._axes = robot, robot.axis_alarms.shape[2]
+        pair, size = np.empty((2, self._axes)), 2 * (2 + robot.mounting.size)
+        self._estimate = prepared(estimate_object, (robot.chain, robot.p_LE), VECTOR, VECTOR, VECTOR)
+        known = robot.chain, robot.p_LE, robot.mounting
+        self._largest = prepared(largest_departure, known, VECTOR, VECTOR, VECTOR, pair, VECTOR, pair)
+        self._state = self.DeclareVectorInputPort("robot_state", size)
+        self._pose = self.DeclareVectorInputPort("object_pose", 3)
+        self._led = self.DeclareVectorInputPort("nominal", NOMINAL_SIZE)
+        if self._axes:
+            self._led_axes = self.DeclareVectorInputPort("nominal_axes", 2 * self._axes)
+            self._funnels = self.DeclareVectorInputPort("funnels", 2 * self._axes)
+            self._cell = self.DeclareVectorInputPort("current_cell", CURRENT_CELL_SIZE)
+        start = robot.start
+        self.DeclareDiscreteState(self.state_at_rest(start[:2], start[2 : 2 + self._axes], 0))
+        self._alarm = self.DeclareVectorOutputPort("alarm", ALARM_SIZE, self._write_alarm)
+        self.declare_update(self._remember, robot.period, robot.offset)
+
+    def state_at_rest(
+        self, position: Sequence[float] | FloatArray, axes: FloatArray, cell: int
+    ) -> FloatArray:
+        """Return the state of a monitor whose robot rests in a cell, its nominal motion where it is.
+
+        Args:
+            position: p^ [m].
+            axes: x^ of the axes that have a nominal motion [rad or m].
+            cell: Index of the cell.
+        """
+        levels = self._robot.axis_alarms[cell].ravel()
+        row = np.concatenate([position, [0.0, 0.0], axes[: self._axes], np.zeros(self._axes), levels])
+        return np.concatenate([[LONG_AGO], *[row] * self._robot.measurement_periods])
+
+    def _now(self, context: Context) -> FloatArray:
+        """Return p^, p^', x^, x^' and the levels of now, shape (4 + 4 axes,)."""
+        led = self._led.Eval(context)[:4]
+        if not self._axes:
+            return led
+        alarms, axes = self._robot.axis_alarms, self._led_axes.Eval(context)
+        lower, upper = self._funnels.Eval(context).reshape(2, -1)
+        levels = alarms[index_of(self._cell.Eval(context), len(alarms))].copy()
+        for i, reserve in enumerate(self._robot.axis_reserve):
+            levels[0, i] = axis_level(levels[0, i], reserve, axes[i], lower[i], upper[i])
+        return np.concatenate([led, axes, levels.ravel()])
+
+    def _write_alarm(self, context: Context, output: BasicVector) -> None:
+        past = context.get_discrete_state_vector().value()
+        then = past[-(4 + 4 * self._axes) :] if self._robot.measurement_periods else self._now(context)
+        measured, seen = self._state.Eval(context), np.empty(6)
+        self._estimate(measured, self._pose.Eval(context), seen)
+        axes, levels = then[4:].reshape(2, 2, -1) if self._axes else np.empty((2, 2, 0))
+        share, which = self._largest(measured, seen, then[:4].copy(), axes, self._robot.levels, levels)
+        output.SetFromVector([alarm_at(share, context.get_time(), float(past[0])), share, float(which)])
+
+    def _remember(self, context: Context, discrete_state: DiscreteValues) -> EventStatus:
+        past = context.get_discrete_state_vector().value()
+        following = discrete_state.get_mutable_vector().get_mutable_value()
+        following[0] = context.get_time() if self._alarm.Eval(context)[1] > 1.0 else past[0]
+        if self._robot.measurement_periods:
+            now = self._now(context)
+            following[1 : 1 + now.size], following[1 + now.size :] = now, past[1 : -now.size]
+        return EventStatus.Succeeded()

@@ -1,0 +1,105 @@
+"""Whether a plan's monitors see what departs, and leave alone what does not: their levels, computed again.
+
+A level must not be below what the budget lets a robot measure, its departure and the noise of one robot. What
+departs just below it, with the noise that may hide it and by how much it grows until a report is used that
+does not know of it, must still be where the certificates are: the object in its cell, an axis in its funnel.
+"""
+
+from __future__ import annotations
+
+from math import ceil
+
+import numpy as np
+
+from coop_drake.answers.alarms import Alarms
+from coop_drake.answers.budget import Budget, Tolerance
+from coop_drake.answers.plan import Plan
+from coop_drake.answers.position_tube import PositionTube
+from coop_drake.errors import RefusalError
+from coop_drake.tree.pose import FloatArray
+
+ROUNDING = 1e-9
+"""Differences that rounding explains [m, rad, and per second]."""
+
+
+def alarms_of(plan: Plan) -> Alarms:
+    """Return the levels that a plan with a budget states for all transitions.
+
+    Raises:
+        RefusalError: They are missing.
+    """
+    if plan.alarms is None:
+        raise RefusalError("alarms", "is missing, but the plan has a budget")
+    return plan.alarms
+
+
+def check_alarms(alarms: Alarms, tube: PositionTube, budget: Budget) -> float:
+    """Check the levels of position, velocity and grasp; return how wide a cell's strip must be [m].
+
+    Stated departures are no less than those that the budget gives, which has been checked.
+
+    Raises:
+        RefusalError: Names the level.
+    """
+    one = budget.single_noise
+    _check(alarms.position, tube.radius + one * budget.position_noise, "alarms.position")
+    _check(alarms.velocity, tube.rate + one * budget.velocity_noise, "alarms.velocity")
+    for name, stated, noise in (
+        ("grasp", alarms.grasp, budget.grasp_noise),
+        ("turn", alarms.turn, budget.turn_noise),
+    ):
+        if (stated is None) != (noise is None):
+            raise RefusalError(f"alarms.{name}", f"is {stated}; the budget has {noise}")
+        if stated is not None and noise is not None:
+            _check(stated, noise, f"alarms.{name}")
+    if not budget.axes and alarms.axis_reserve.size:
+        raise RefusalError("alarms.axis_reserve", "is stated, but the plan has no budget for the axes")
+    unnoticed = budget.position_noise + _grows(budget, budget.velocity_noise, budget.acceleration_error)
+    return alarms.position + unnoticed
+
+
+def check_axis_alarms(alarms: Alarms, stated: Tolerance, budget: Budget, where: str) -> None:
+    """Check the levels of the axes in a transition, and that they leave room.
+
+    Where an axis is near a bound of its funnel, its level is what the reserve leaves of the nominal distance.
+    That must be no less than what it may depart from its nominal motion, and a robot's noise.
+
+    Raises:
+        RefusalError: Names the level and the axis.
+    """
+    axes = stated.departure.size
+    noise = np.where(np.arange(axes) == 0, budget.single_noise, 1.0)
+    for name, departure, size in (
+        ("alarm", stated.departure, budget.angle_noise),
+        ("rate_alarm", stated.rate_departure, budget.rate_noise),
+    ):
+        levels: FloatArray = getattr(stated, name)
+        if levels.shape != departure.shape:
+            raise RefusalError(f"{where}.{name}", f"has {levels.size} numbers, not {axes}")
+        for axis, (level, least) in enumerate(zip(levels, departure + noise * size, strict=True)):
+            _check(float(level), float(least), f"{where}.{name}[{axis}]")
+    if alarms.axis_reserve.shape != (axes,):
+        raise RefusalError("alarms.axis_reserve", f"has {alarms.axis_reserve.size} numbers, not {axes}")
+    needed = budget.angle_noise + _grows(budget, budget.rate_noise, budget.axis_acceleration_error)
+    for axis, reserve in enumerate(alarms.axis_reserve):
+        _check(float(reserve), needed, f"alarms.axis_reserve[{axis}]")
+        room = float(stated.distance[axis] - noise[axis] * budget.angle_noise)
+        if not room >= reserve - ROUNDING:
+            finding = f"leaves {room:.6g} beside a robot's noise; its monitor needs {reserve:.6g}"
+            raise RefusalError(f"{where}.distance[{axis}]", finding)
+
+
+def _check(stated: float, least: float, where: str) -> None:
+    """Refuse a level that is not the one that follows: a lower one rings in vain, a higher one sees less."""
+    if not abs(stated - least) <= ROUNDING * (1.0 + least):
+        raise RefusalError(where, f"is {stated:.9g}; the budget gives {least:.9g}")
+
+
+def _grows(budget: Budget, rate: float, acceleration: float) -> float:
+    """Return by how much a departure grows that moves no faster than noise hides, until reports know of it.
+
+    In the age of the measurements, in that of reports, each in whole periods, and in one period more.
+    """
+    T = budget.period
+    time = T * (1 + ceil(budget.delay / T - 1e-9) + ceil(budget.report_age / T - 1e-9))
+    return rate * time + acceleration * time * time / 2.0
