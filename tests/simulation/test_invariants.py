@@ -34,6 +34,7 @@ GOOD = Sample(
     held=0.0,
     clock_lag=0.0,
     causes=np.zeros(0),
+    alarms=np.zeros((0, 3)),
     arrived=False,
 )
 

@@ -191,6 +191,7 @@ def _sample(log: SimulationLog, i: int, z: np.ndarray, rates: np.ndarray) -> Sam
         z=z,
         rates=rates,
         causes=np.zeros(0),
+        alarms=np.zeros((0, 3)),
         arrived=False,
         **arrays,
     )
