@@ -53,7 +53,9 @@ def verify_plan(
     checks = [same, *exact, check_gains(plan, gain_sets)]
     if plan.refused_by:
         return _verified_way(plan, (*checks, *_of_way(plan, problem), check_refusals(plan, problem)))
-    origin = None if budgets is None else check_origin(plan.budget, budgets)
+    origin = None if plan.budget is None else Check("the budget is compared with no scenario", 0)
+    if budgets is not None:
+        origin = check_origin(plan.budget, budgets)
     checks += [
         further
         for further in (check_speeds(plan, problem), check_accelerations(plan, problem), origin)

@@ -6,27 +6,32 @@ entries that are left out. What is refused nowhere stands in ``FREE``, with the 
 
 import json
 from copy import deepcopy
-from dataclasses import replace
+from dataclasses import is_dataclass, replace
 from functools import cache
-from typing import NamedTuple
+from types import UnionType
+from typing import NamedTuple, Union, get_args, get_origin
 
 import pytest
 
 from coop_drake.answers.document import Document
+from coop_drake.answers.plan import Plan
 from coop_drake.answers.plan_file import plan_document, read_plan
 from coop_drake.errors import PlanError, RefusalError
+from coop_drake.laws import ScheduledGains
 from coop_drake.planning.execution.transitions import with_gains
 from coop_drake.planning.planner import plan as make
 from coop_drake.plant import planning_problem
 from coop_drake.plant.budgets import budget_of, scenario_budgets
 from coop_drake.scenario import Deployment, load_scenario
-from coop_drake.typed_data import convert_class
+from coop_drake.scenario.limits import RobotLimits
+from coop_drake.typed_data import convert_class, field_types
 from coop_drake.verification import exact, verify_plan
 from coop_drake.verification.budgets import check_origin
 from coop_drake.verification.gains import check_ages
 from tests.support.certificates import GAINS, room_with_pillar
 from tests.support.last_cells import last_cells
 from tests.support.scenarios import MODELS
+from tests.support.small_scenario import small_scenario
 
 SCENARIOS = ("base", "warehouse", "three", "tight", "elbow")
 """The shipped scenarios that have a plan."""
@@ -250,6 +255,45 @@ def test_every_entry_of_a_way_that_limits_refuse_is_compared_or_a_free_choice():
     check_kinds(one, slice(None), {"refused_by", "refused_by[]"})
     with pytest.raises(RefusalError, match="a way that limits refuse has none"):
         verify_plan(replace(way, budget=stated().budget), problem, GAINS)
+
+
+@cache
+def limited():
+    """A plan whose gains are slowed until no limit of acceleration acts."""
+    scenario = small_scenario()
+    goal = replace(scenario.goal, joints={"robot_0": (0.4,), "robot_1": (-0.3,)})
+    scenario = replace(scenario, goal=goal, limits={"*": RobotLimits(joint_accelerations=(0.5,))})
+    problem = planning_problem(scenario)
+    return Case(
+        as_written(make(problem, ScheduledGains(), gain_set_name="scheduled").plan), problem, GAINS, None
+    )
+
+
+def test_every_entry_of_a_plan_with_limits_of_acceleration_is_compared_or_a_free_choice():
+    assert limited().document["age_factor"] > 1.0
+    check_kinds(limited(), slice(None))
+
+
+def fields_of(kind, way=""):
+    """The places of all fields of a class of typed data in its document."""
+    origin, parts = get_origin(kind), get_args(kind)
+    if origin in (Union, UnionType):
+        return [place for part in parts for place in fields_of(part, way)]
+    if origin is tuple:
+        return fields_of(parts[0], f"{way}[]")
+    if not is_dataclass(kind):
+        return []
+    types = {name: field.kind for name, field in field_types(kind).items()}
+    own = {name: f"{way}.{name}".removeprefix(".") for name in types}
+    return [*own.values(), *(place for name, part in types.items() for place in fields_of(part, own[name]))]
+
+
+def test_every_field_of_a_plan_is_altered_in_one_of_these_tests():
+    documents = [limited().document, *(case(name, True).document for name in SCENARIOS)]
+    kinds = {kind for document in documents for kind in places(document)}
+    refused_by = {place for place in fields_of(Plan) if place.startswith("refused_by[]")}  # of ways, above
+    missing = set(fields_of(Plan)) - kinds - refused_by
+    assert not missing, f"no test alters {sorted(missing)}: add a case whose plan has these entries"
 
 
 def check_kinds(one, some, but=frozenset()):

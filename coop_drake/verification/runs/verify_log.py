@@ -111,7 +111,7 @@ def verify_log(
             [
                 *aside,
                 *_taken_as_logged(log, checks),
-                "other runs; that the robots are as in their models",
+                "that p_G moved along the cells' maps; other runs; that the robots are as in their models",
             ]
         ),
     )
