@@ -84,7 +84,7 @@ def changes(tree: ComponentTree) -> list[TeamChange]:
 
     kinds = (("smaller bases", base_bodies(tree)), ("smaller object", object_bodies(tree)))
     listed = [shrinking(name, bodies) for name, bodies in kinds if bodies]
-    if tree.joints:
+    if not all(joint.circular for joint in tree.joints):
         name, wider = "wider joint range", partial(widened_joints, tree)
         listed.append(TeamChange(name, "rad", wider, MOST_WIDENING, WIDENING_RESOLUTION))
     return listed

@@ -1,13 +1,15 @@
 """Smaller bodies lie inside larger ones, or nothing is said of all sizes from one."""
 
 from itertools import pairwise
+from math import pi
 
 import pytest
 from shapely import union_all
 
 from coop_drake.diagnosis.relaxations import changes
-from coop_drake.diagnosis.team_changes import shrunk_bodies
+from coop_drake.diagnosis.team_changes import shrunk_bodies, widened_joints
 from coop_drake.tree.component_tree import Body, Component, ComponentTree
+from tests.planning.test_continuous_joints import turret
 from tests.support.cases import disc, rectangle
 from tests.support.trees import placed_shape
 
@@ -34,3 +36,12 @@ def test_a_body_that_is_seen_from_a_point_of_it_shrinks_into_itself(name: str) -
     sizes = [outline(shrunk_bodies(tree, {"box"}, factor)) for factor in (1.0, 0.7, 0.3)]
     nested = all(larger.buffer(1e-9).covers(less) for larger, less in pairwise(sizes))
     assert nested is inwards
+
+
+def test_joints_without_limits_are_not_widened() -> None:
+    endless, limited = turret().tree, turret(limits=(-3.0, 3.0)).tree
+    assert widened_joints(endless, 1.0).joints == endless.joints
+    (wider,) = widened_joints(limited, 1.0).joints
+    assert (wider.lower, wider.upper, wider.circular) == (-pi, pi, False)
+    assert "wider joint range" not in [change.name for change in changes(endless)]
+    assert "wider joint range" in [change.name for change in changes(limited)]
