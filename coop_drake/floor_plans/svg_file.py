@@ -281,15 +281,19 @@ class _Walk:
         if min(width, height) < 0.0:
             raise self.refuse(element, "its size is negative", "ungroup it")
         box, aspect = view_box(self.file, element), element.get("preserveAspectRatio", "xMidYMid").strip()
-        if max(width, height) == inf and (box or style.values["overflow"] not in ("visible", "auto")):
+        overflow = style.values["overflow"]
+        if overflow not in ("visible", "auto", "hidden", "scroll", "clip"):
+            raise self.refuse(element, f"overflow: {overflow} is not read", "ungroup it")
+        is_cut = overflow not in ("visible", "auto")
+        if max(width, height) == inf and (box or is_cut):
             raise self.refuse(
                 element, "an inner page without a size", "ungroup it, or state width and height"
             )
         if not _ASPECT.fullmatch(aspect):
             raise self.refuse(element, f"preserveAspectRatio {aspect!r} is none that SVG knows", "ungroup it")
-        if style.values["overflow"] not in ("visible", "auto"):
+        if is_cut:
             corners = np.array([(x, y), (x + width, y), (x + width, y + height), (x, y + height)])
-            style = style.cut(Polygon(self._placed(corners, style.transform)))
+            style = style.cut(Polygon(self._placed(corners, self._matrix(style))))
         laid = f"translate({x!r}, {y!r})"
         if box:
             laid = Viewbox.viewbox_transform(x, y, width, height, *box, aspect)
@@ -323,7 +327,7 @@ class _Walk:
         """The areas inside a shape of a clip path, in W [m], grown by what chords miss of its curves."""
         areas: list[Polygon] = []
         for pieces, _ in self._curves(element, tag, style):
-            points, strays = self._flat(pieces)
+            points, strays = self._flat(pieces, style)
             area = Polygon(points) if len(points) > 2 else Polygon()
             if not area.is_valid or any(area.intersects(other) for other in areas):
                 raise self.refuse(element, "a clip path whose outlines meet is not read", remedy)
@@ -342,10 +346,11 @@ class _Walk:
             raise self.refuse(element, finding, "remove it")
         self.told.update(self._assumed(values, tag, stroked=stroked))
         curves = self._curves(element, tag, style)
-        most, least = self._stretch(style)
+        # The factors by which the transform stretches the directions that it stretches most and least.
+        most, least = np.linalg.svd(self._matrix(style)[:, :2], compute_uv=False).tolist()
         even = most - least <= _SIMILAR * most
         for pieces, closed in curves:
-            points, strays = self._flat(pieces)
+            points, strays = self._flat(pieces, style)
             if closed and (points[0] == points[-1]).all():
                 points = points[:-1]
             closed = closed and len(points) > 2
@@ -355,7 +360,7 @@ class _Walk:
                 half_width,
                 closed,
                 name_of(element),
-                flat=even and strays == 0.0 and values["stroke-linecap"] not in ("round", "square"),
+                flat=even and strays == 0.0 and values["stroke-linecap"] == "butt",
                 mitre=self._mitre(points, closed, values, most / least if least else inf) if stroked else 2.0,
                 clip=style.clip,
             )
@@ -382,14 +387,6 @@ class _Walk:
         if marked and tag in ("path", "line", "polyline", "polygon"):
             yield "marker"
 
-    def _stretch(self, style: _Style) -> tuple[float, float]:
-        """The largest and the smallest factor by which lengths grow on the page, up to its own scale [-]."""
-        from svgelements import Matrix
-
-        matrix = Matrix(style.transform)
-        most, least = np.linalg.svd([[matrix.a, matrix.c], [matrix.b, matrix.d]], compute_uv=False)
-        return float(most), float(least)
-
     def _mitre(self, points: FloatArray, closed: bool, values: Values, stretch: float) -> float:
         """How far the sharpest mitred corner of a stroke reaches, over half its width [-]; two at least."""
         if values["stroke-linejoin"] in ("round", "bevel"):
@@ -397,7 +394,7 @@ class _Walk:
         try:
             limit = float(values["stroke-miterlimit"])
         except ValueError:
-            limit = float(INITIAL["stroke-miterlimit"])
+            limit = inf
         ring = np.vstack([points[-1:], points, points[:1]]) if closed else points
         steps = np.diff(ring, axis=0)
         steps = steps[np.hypot(*steps.T) > 0.0]
@@ -428,13 +425,11 @@ class _Walk:
         return length(usual if text == "auto" else text, self.file, f"{name_of(element)} {key}", whole)
 
     def _curves(self, element: Element, tag: str, style: _Style) -> list[tuple[list[Any], bool]]:
-        """Control points of all pieces of each outline of a shape, on the page; and whether it is closed."""
-        from svgelements import Matrix
+        """Control points of the pieces of each outline, in the shape's coordinates; whether it is closed."""
         from svgelements import Path as Outline
 
         try:
-            outline = Outline(self._outline(element, tag, style)) * Matrix(style.transform)
-            outline.reify()
+            outline = Outline(self._outline(element, tag, style))
             curves = [_pieces(subpath) for subpath in outline.as_subpaths()]
         except (ValueError, TypeError, IndexError, ZeroDivisionError, OverflowError) as error:
             raise self.refuse(
@@ -442,20 +437,25 @@ class _Walk:
             ) from error
         return [(pieces, closed) for pieces, closed in curves if pieces]
 
-    def _flat(self, pieces: list[Any]) -> tuple[FloatArray, float]:
+    def _flat(self, pieces: list[Any], style: _Style) -> tuple[FloatArray, float]:
         """The points of an outline in W [m], and how far its curves stray from its chords [m]."""
-        placed = [self.page.place(np.array(piece, dtype=float)) for piece in pieces]
+        matrix = self._matrix(style)
+        placed = [self._placed(np.array(piece, dtype=float), matrix) for piece in pieces]
         points, strays = flatten(placed, self.settings.sagitta, from_arcs=True)
         self.points += len(points)
         refuse_many(self.file, self.points)
         return points, strays
 
-    def _placed(self, points: FloatArray, transform: str) -> FloatArray:
-        """Points of an element's coordinates in W [m]."""
+    def _matrix(self, style: _Style) -> FloatArray:
+        """From (x, y, 1) of an element to the coordinates of the page, shape (2, 3)."""
         from svgelements import Matrix
 
-        m = Matrix(transform)
-        return self.page.place(points @ np.array([[m.a, m.b], [m.c, m.d]]) + (m.e, m.f))
+        m = Matrix(style.transform)
+        return np.array([[m.a, m.c, m.e], [m.b, m.d, m.f]], dtype=float)
+
+    def _placed(self, points: FloatArray, matrix: FloatArray) -> FloatArray:
+        """Points of an element's coordinates in W [m]."""
+        return self.page.place(points @ matrix[:, :2].T + matrix[:, 2])
 
     def _outline(self, element: Element, tag: str, style: _Style) -> Any:
         import svgelements

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
-from shapely import LineString, box
+from shapely import LineString, Polygon, box, contains_xy
 from shapely.affinity import affine_transform
+from svgelements import Matrix
 
 from coop_drake.errors import FloorPlanError
 from coop_drake.floor_plans import FloorPlanSettings, read_floor_plan
@@ -286,6 +288,7 @@ NOT_READ = {
         "a clip path whose outlines meet is not read",
     ),
     "language": ("", "<g systemLanguage='de'/>", "<g>: it is shown to readers of some languages only"),
+    "overflow": ("", "<svg overflow='hidden visible' width='1' height='1'/>", "overflow: hidden visible"),
     "stroke of the screen": ("", across(f"style='{WIDE};vector-effect:non-scaling-stroke'"), "vector-effect"),
     "unknown element": ("", f"<wall>{across()}</wall>", "<wall>: the reader knows no such element"),
     "clone that rules see by its place": (
@@ -378,6 +381,20 @@ def test_a_stroke_that_a_transform_stretches_is_nowhere_thinner_than_drawn(tmp_p
     floor = room_of(tmp_path, body)
     drawn = affine_transform(LineString([(1, 4), (1.5, 2)]).buffer(0.1, cap_style="flat"), [4, 0, 0, 1, 0, 0])
     assert floor.intersection(drawn).area == pytest.approx(0.0, abs=1e-12)
+
+
+@pytest.mark.parametrize("transform", ["skewX(40)", "matrix(1 .5 .7 1 0 0)", "scale(3,.5) rotate(30)"])
+@pytest.mark.parametrize("ry", [1.0, 0.4])
+def test_arcs_are_where_a_skewed_transform_takes_them(tmp_path, transform, ry):
+    arc = f"A1 {ry} 0 0 1"
+    drawn = f"<path transform='translate(5,3) {transform}' d='M-1 0{arc} 1 0{arc} -1 0Z'/>"
+    floor = room_of(tmp_path, drawn)
+    angle = np.linspace(0.0, 2.0 * np.pi, 500)
+    m = Matrix(transform)
+    x, y = np.cos(angle), ry * np.sin(angle)
+    assert not contains_xy(floor, 5 + m.a * x + m.c * y, 3 - m.b * x - m.d * y).any()
+    (hole,) = floor.interiors
+    assert Polygon(hole).area == pytest.approx(abs(m.determinant) * np.pi * ry, rel=1e-2)
 
 
 def test_notes_count_what_is_left_out_and_what_is_read_as_more(tmp_path):
