@@ -34,7 +34,7 @@ def test_plan_names_every_limit_and_writes_the_way(refused):
 def test_the_way_is_verified_and_not_simulated(refused, tmp_path):
     scenario, out, _ = refused
     verified = invoke("verify", out / "way.json", scenario, "--json")
-    assert verified.exit_code == 0, verified.stderr
+    assert verified.exit_code == 5, verified.stderr
     assert json.loads(verified.stdout)["answer"] == "beyond limits"
     simulated = invoke("simulate", scenario, "--plan", out / "way.json", "--out", tmp_path / "out")
     assert simulated.exit_code == 2

@@ -10,6 +10,10 @@ import numpy as np
 from coop_drake.tree.pose import FloatArray
 from coop_drake.typed_data import EXACT, Bounds, Limits, NotNegative, Positive
 
+SLOWEST_AGE = 7.0
+"""Gains are for so many times the age of the gain set's commands at most [-]: accelerations fall by up to the
+square of the factor, so that it allows for limits of a few tenths."""
+
 Unit = Literal["m", "s", "rad/s^2", "m/s^2"]
 """Units of the limits that can refuse a plan."""
 

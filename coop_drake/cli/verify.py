@@ -106,7 +106,8 @@ def _verify(
         reporter.facts["trusted"] = list(TRUSTED)
         reporter.say(escape("To be trusted: " + "; ".join(TRUSTED)))
     reporter.say(escape(f"Proved: {verified.proved}. Not proved: {verified.not_proved}"))
-    return ExitCode.DONE
+    # A way is no answer to the question: another one may keep the limits.
+    return ExitCode.BEYOND_LIMITS if verified.answer == "beyond limits" else ExitCode.DONE
 
 
 def _row(check: Check) -> tuple[str, str, str]:

@@ -15,6 +15,7 @@ from shapely.errors import ShapelyError
 
 from coop_drake.answers.budget import Budget
 from coop_drake.answers.digest import problem_digest
+from coop_drake.answers.limits import SLOWEST_AGE
 from coop_drake.answers.plan import BeyondLimits, Found, Infeasible, Plan, PlanningResult, Undecided
 from coop_drake.answers.problem import PlanningProblem
 from coop_drake.answers.search_report import SearchReport
@@ -37,9 +38,9 @@ if TYPE_CHECKING:
 FINER_ATTEMPTS = 2
 """Number of further searches after a path that cannot be executed, each with half the margin."""
 
-AGE_FACTORS = (1.0, 1.5, 2.0, 3.0, 4.5, 7.0)
+AGE_FACTORS = (1.0, 1.5, 2.0, 3.0, 4.5, SLOWEST_AGE)
 """Gains are tried for so many times the age of the gain set's commands until no limit of acceleration acts
-[-]: accelerations fall by up to the square of the factor, so that 7 allows for limits of a few tenths."""
+[-]."""
 
 
 def plan(
@@ -221,7 +222,10 @@ def _made(
         raise ValueError(f"a budget needs scheduled gains; the gain set {name!r} is fixed")
     from coop_drake.planning.budget.tolerant import tolerant_plan  # Here: it imports scipy.
 
-    return tolerant_plan(problem, found, gain_set, gain_set_name=name, budget=budget, progress=progress)
+    made = tolerant_plan(problem, found, gain_set, gain_set_name=name, budget=budget, progress=progress)
+    if isinstance(made, Plan) and (broken := refusals(problem, made)):
+        raise StallError("under the budget, " + "; ".join(refusal.describe() for refusal in broken))
+    return made
 
 
 def _slow_enough(

@@ -2,10 +2,10 @@
 
 from collections.abc import Mapping, Sequence
 
-from coop_drake.answers.problem import PlanningProblem
+from coop_drake.answers.problem import PlanningProblem, object_radius
 from coop_drake.errors import ScenarioError
 from coop_drake.plant.chain import limits_of
-from coop_drake.plant.placement import collisions, wall_clearance
+from coop_drake.plant.placement import collisions, core, wall_clearance
 from coop_drake.plant.team import TeamPlant
 from coop_drake.scenario import Scenario
 from coop_drake.scenario.limits import ALL_ROBOTS, RobotLimits
@@ -18,7 +18,8 @@ def check_joints(scenario: Scenario, team: TeamPlant) -> None:
         ScenarioError: An unknown robot, a wrong number of values, a value outside its joint's limits.
     """
     _check_section(scenario, team, "start.joints", scenario.start.joints)
-    _check_section(scenario, team, "goal.joints", scenario.goal.joints)
+    tolerance = scenario.goal.tolerances.joint
+    _check_section(scenario, team, "goal.joints", scenario.goal.joints, tolerance)
     _check_rates(scenario, team)
     count, given = sum(len(robot.joints) for robot in team.robots), scenario.deployment.start_offset.joints
     if given and len(given) != count:
@@ -31,7 +32,11 @@ def check_joints(scenario: Scenario, team: TeamPlant) -> None:
 
 
 def _check_section(
-    scenario: Scenario, team: TeamPlant, key: str, section: Mapping[str, Sequence[float | None]]
+    scenario: Scenario,
+    team: TeamPlant,
+    key: str,
+    section: Mapping[str, Sequence[float | None]],
+    tolerance: float = 0.0,
 ) -> None:
     file = str(scenario.path)
     robots = {robot.name: robot for robot in team.robots}
@@ -45,8 +50,11 @@ def _check_section(
             raise ScenarioError(file, f"{key}.{name}", list(values), allowed)
         for place, (value, joint) in enumerate(zip(values, robot.joints, strict=True)):
             lower, upper = limits_of(joint)
-            if value is not None and not lower <= value <= upper:
+            if value is not None and not lower - tolerance <= value <= upper + tolerance:
                 allowed = f"a value of {robot.joint_names[place]} between its limits {lower:g} and {upper:g}"
+                allowed += (
+                    f", or beyond one by the tolerance {tolerance:g} at most" if tolerance > 0.0 else ""
+                )
                 raise ScenarioError(file, f"{key}.{name}[{place}]", value, allowed)
 
 
@@ -64,7 +72,7 @@ def _check_rates(scenario: Scenario, team: TeamPlant) -> None:
 
 
 def check_places(scenario: Scenario, problem: PlanningProblem) -> None:
-    """Refuse a start in collision, and a goal where the object alone leaves the floor.
+    """Refuse a start in collision, and a goal where the object leaves the floor by more than its tolerances.
 
     Raises:
         ScenarioError: With the bodies and their clearance.
@@ -74,9 +82,14 @@ def check_places(scenario: Scenario, problem: PlanningProblem) -> None:
         allowed = f"a configuration without collision ({first} touches {second}, clearance {clearance:.4f} m)"
         raise ScenarioError(file, "start", problem.start.tolist(), allowed)
     goal = scenario.goal.object.pose
+    room = problem.position_tolerance + object_radius(problem.tree) * problem.angle_tolerance
     for body in problem.tree.components[0].bodies:
-        clearance = wall_clearance(body, goal, problem.workspace)
-        if body.robot is None and clearance <= 0.0:
+        # What is deeper inside a body than its points move within the tolerances stays in it.
+        held = [core(shape, goal).buffer(shape.radius - room) for shape in body.shapes]
+        if body.robot is None and any(
+            not problem.workspace.contains(one) for one in held if not one.is_empty
+        ):
+            clearance = wall_clearance(body, goal, problem.workspace)
             found = f"{body.name} touches the walls, clearance {clearance:.4f} m"
             raise ScenarioError(
                 file, "goal.object", [goal.x, goal.y, goal.angle], f"a pose inside the workspace ({found})"

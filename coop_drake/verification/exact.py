@@ -24,7 +24,7 @@ from coop_drake.verification.checks import Check, Verified
 from coop_drake.verification.gains import check_gains
 from coop_drake.verification.problem_match import check_problem
 from coop_drake.verification.question import question_of
-from coop_drake.verification.refusals import check_refusals
+from coop_drake.verification.refusals import check_limits
 from coop_drake.verification.speeds import check_accelerations, check_speeds
 
 
@@ -36,7 +36,9 @@ def verify_plan(
     *,
     budgets: ScenarioBudgets | None = None,
 ) -> Verified:
-    """Check everything that a plan states, but for its estimated times.
+    """Check everything that a plan states.
+
+    A way, a plan that limits refuse, is no answer to the question: other ways may keep the limits.
 
     Args:
         plan: The plan.
@@ -51,14 +53,15 @@ def verify_plan(
     same = check_problem(plan, problem)
     exact = _exactly(problem, plan_document(plan), progress)
     checks = [same, *exact, check_gains(plan, gain_sets)]
+    kept = check_limits(plan, problem, gain_sets[plan.gain_set])
     if plan.refused_by:
-        return _verified_way(plan, (*checks, *_of_way(plan, problem), check_refusals(plan, problem)))
+        return _verified_way(plan, (*checks, *_of_way(plan, problem), *kept))
     origin = None if plan.budget is None else Check("the budget is compared with no scenario", 0)
     if budgets is not None:
         origin = check_origin(plan.budget, budgets)
     checks += [
         further
-        for further in (check_speeds(plan, problem), check_accelerations(plan, problem), origin)
+        for further in (check_speeds(plan, problem), check_accelerations(plan, problem), *kept, origin)
         if further is not None
     ]
     checks += check_position(plan, problem.position_tolerance)
@@ -70,7 +73,8 @@ def verify_plan(
         f"plan of {len(plan.cells)} cells{whose}",
         tuple(checks),
         "no body touches a wall or another body in any state of the cells, which lead from start to goal",
-        f"{_unproved_of_control(plan)}; the estimated times; that the robots are as in their models",
+        f"{_unproved_of_control(plan)}; that it takes as long as is estimated; that the robots are as in "
+        "their models",
     )
 
 
@@ -97,8 +101,10 @@ def _verified_way(plan: Plan, checks: tuple[Check, ...]) -> Verified:
         "beyond limits",
         f"a way of {len(plan.cells)} cells, refused by {limits}",
         checks,
-        "no body touches a wall or another body in any state of the cells, which lead from start to goal",
-        "that no other way keeps the limits; the estimated times; that the robots are as in their models",
+        "no body touches a wall or another body in any state of the cells, which lead from start to goal; "
+        "this way breaks these limits",
+        "that no other way keeps them: it is no answer to the question; that the robots are as in their "
+        "models",
     )
 
 

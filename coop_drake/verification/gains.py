@@ -29,9 +29,6 @@ def check_gains(plan: Plan, gain_sets: Mapping[str, GainSet]) -> Check:
     Limits are taken as they are stated; ``check_speeds`` and ``check_accelerations`` check them. So are the
     distances and rates of the condition of rest, which ``check_budget`` checks, and K of a plan with a tube.
 
-    The estimated time comes of a simulation and does not matter for safety: it is the only figure that
-    nothing but the digest of the file protects.
-
     Args:
         plan: The plan.
         gain_sets: The scenario's gain sets by name.

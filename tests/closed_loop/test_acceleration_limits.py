@@ -20,7 +20,7 @@ from coop_drake.plant import planning_problem, run_setup
 from coop_drake.scenario.limits import RobotLimits
 from coop_drake.simulation import build_maps
 from coop_drake.verification import verify_file
-from coop_drake.verification.refusals import check_refusals
+from coop_drake.verification.refusals import check_limits
 from coop_drake.verification.runs import verify_log
 from coop_drake.verification.runs.rows import Rows
 from coop_drake.verification.runs.speeds import check_run_efforts
@@ -82,11 +82,14 @@ def test_a_limit_that_no_gains_keep_is_named():
     assert limit.value > 10.0 * limit.allowed
     assert (limit.unit, limit.joint) in {("rad/s^2", joint.name) for joint in problem.tree.joints}
     assert f"{limit.joint} is accelerated by" in refused.reason
-    assert check_refusals(refused.plan, problem).count == 1
-    for change in ({"unit": "m/s^2"}, {"joint": "object::lid"}, {"allowed": 0.1}):
+    assert check_limits(refused.plan, problem, FixedGains())[-1].count == 1
+    changes = {"unit": "m/s^2"}, {"joint": "object::lid"}, {"allowed": 0.1}, {"value": 1.01 * limit.value}
+    for change in changes:
         altered = replace(refused.plan, refused_by=(replace(limit, **change),))
-        with pytest.raises(RefusalError, match="these are not the plan's"):
-            check_refusals(altered, problem)
+        with pytest.raises(RefusalError, match=r"refused_by\[0\]"):
+            check_limits(altered, problem, FixedGains())
+    with pytest.raises(RefusalError, match=r"refused_by: does not say .* limits\.joint_accel"):
+        check_limits(replace(refused.plan, refused_by=()), problem, FixedGains())
 
 
 def test_altered_limits_are_refused(run, tmp_path):

@@ -150,3 +150,18 @@ def test_goal_needs_only_the_object_inside(tmp_path):
     """Whether the arms find room there is the planner's question."""
     path = write_edited(tmp_path, (GOAL, "object: {x: 6.3, y: 9.5, theta: 1.5707963}"))
     assert problem_of(load_scenario(path)).goal_pose == pytest.approx(np.array([6.3, 9.5, 1.5707963]))
+
+
+def test_goal_may_be_beyond_a_wall_or_a_limit_by_its_tolerances(tmp_path):
+    """The object is half a metre wide, its middle 0.245 m from the wall, the limit of a joint 1.87 rad."""
+    goal = "object: {x: 6.355, y: 8, theta: 1.5707963}\n  joints: {robot_0: [1.885]}"
+    path = write_edited(tmp_path, (GOAL.split("  #")[0], goal))
+    assert problem_of(load_scenario(path)).goal_joints == (1.885, None)
+    given = "tolerances: {position: 0.01, angle: 0.02}"
+    for tolerances, message in (
+        ("tolerances: {position: 0.001, angle: 0.001}", "object::body touches the walls"),
+        ("tolerances: {joint: 0.01}", r"between its limits -1\.87 and 1\.87, or beyond one by"),
+    ):
+        path = write_edited(tmp_path, (GOAL.split("  #")[0], goal), (given, tolerances))
+        with pytest.raises(ScenarioError, match=message):
+            problem_of(load_scenario(path))

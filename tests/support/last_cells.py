@@ -9,6 +9,7 @@ import numpy as np
 from coop_drake.answers.digest import problem_digest
 from coop_drake.answers.plan import Plan
 from coop_drake.answers.problem import PlanningProblem
+from coop_drake.planning.execution.estimate import timed
 
 
 def last_cells(plan: Plan, problem: PlanningProblem, count: int) -> tuple[Plan, PlanningProblem]:
@@ -18,4 +19,4 @@ def last_cells(plan: Plan, problem: PlanningProblem, count: int) -> tuple[Plan, 
     asked = replace(problem, start=start)
     cells, transitions = plan.cells[-count:], plan.transitions[-count:]
     ended = replace(plan, start=start, cells=cells, transitions=transitions, problem=problem_digest(asked))
-    return ended, asked
+    return timed(ended), asked

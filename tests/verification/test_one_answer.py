@@ -7,14 +7,16 @@ import pytest
 from shapely import box
 
 from coop_drake.answers.digest import problem_digest
+from coop_drake.answers.limits import SLOWEST_AGE, Refusal
 from coop_drake.answers.problem import PlanningProblem
 from coop_drake.errors import RefusalError
 from coop_drake.laws import ScheduledGains
+from coop_drake.planning.execution.transitions import reschedule
 from coop_drake.planning.planner import plan
 from coop_drake.tree.component_tree import Body, Component, ComponentTree, ConvexShape, TreeJoint
 from coop_drake.tree.pose import PlanarPose
 from coop_drake.verification import verify_plan, verify_proof
-from tests.support.certificates import GAINS
+from tests.support.certificates import GAINS, bent_corridor
 
 BAR = ConvexShape(np.array([[-0.6, -0.1], [0.6, -0.1], [0.6, 0.1], [-0.6, 0.1]]), 0.0)
 ARM = ConvexShape(np.array([[0.0, -0.05], [0.3, -0.05], [0.3, 0.05], [0.0, 0.05]]), 0.0)
@@ -103,3 +105,86 @@ def test_a_free_end_within_the_tolerance_is_found(name):
     found = answer(question).plan
     assert verify_plan(found, question, GAINS).answer == "found"
     np.testing.assert_array_equal(found.goal_pose[:2], question.goal_pose[:2])
+
+
+def limited(problem: PlanningProblem, **limits: float) -> PlanningProblem:
+    return replace(problem, settings=replace(problem.settings, **limits))
+
+
+SLOW = Refusal("planner.max_transition_time", 0, 1e6, 60.0, "s")
+NARROW = Refusal("planner.min_clearance", 0, 1e-9, 1e-3, "m")
+
+
+@pytest.fixture(scope="module")
+def found():
+    problem = bent_corridor(1.2)
+    return problem, answer(problem).plan
+
+
+@pytest.fixture(scope="module")
+def way():
+    problem = limited(bent_corridor(1.2), min_clearance=0.4, max_transition_time=0.3)
+    return problem, answer(problem).plan
+
+
+def first(plan, **change):
+    """A plan with other numbers in its first transition."""
+    return replace(plan, transitions=(replace(plan.transitions[0], **change), *plan.transitions[1:]))
+
+
+@pytest.mark.parametrize("seconds", [1e6, 59.0, 0.0])
+@pytest.mark.parametrize("stated", [(), (SLOW,), (replace(SLOW, value=61.0),)])
+def test_an_estimated_time_that_no_simulation_gives_makes_no_answer(found, seconds, stated):
+    problem, plan = found
+    with pytest.raises(RefusalError, match=r"transitions\[0\].estimated_time: is .* the simulation"):
+        verify_plan(replace(first(plan, estimated_time=seconds), refused_by=stated), problem, GAINS)
+
+
+@pytest.mark.parametrize(
+    "stated",
+    [
+        SLOW,
+        NARROW,
+        replace(NARROW, limit="planner.margin"),
+        Refusal("limits.joint_accelerations", 0, 99.0, 1.0, "rad/s^2", "robot_0::joint"),
+    ],
+)
+def test_a_plan_that_keeps_its_limits_is_not_beyond_them(found, stated):
+    problem, plan = found
+    with pytest.raises(RefusalError, match=r"refused_by\[0\]: .* or it is kept"):
+        verify_plan(replace(plan, refused_by=(stated,)), problem, GAINS)
+
+
+@pytest.mark.parametrize("key", ["neck", "inradius"])
+def test_a_clearance_that_is_stated_too_small_is_not_below_a_limit(found, key):
+    problem, plan = found
+    small = first(plan, **{key: 1e-4})
+    with pytest.raises(RefusalError, match=r"transitions\[0\].gains|refused_by\[0\]: .* or it is kept"):
+        verify_plan(replace(small, refused_by=(replace(NARROW, value=1e-4),)), problem, GAINS)
+
+
+def test_a_way_says_all_limits_that_it_breaks_and_no_other(way):
+    problem, plan = way
+    assert {one.limit for one in plan.refused_by} == {SLOW.limit, NARROW.limit}
+    assert verify_plan(plan, problem, GAINS).answer == "beyond limits"
+    for stated in ((), plan.refused_by[:1], plan.refused_by[1:]):
+        with pytest.raises(RefusalError, match="refused_by: does not say that the plan breaks planner"):
+            verify_plan(replace(plan, refused_by=stated), problem, GAINS)
+    for k, one in enumerate(plan.refused_by):
+        for change in ({"value": 1.01 * one.value + 0.1}, {"cell": 99}, {"allowed": 2.0 * one.allowed}):
+            stated = (*plan.refused_by[:k], replace(one, **change), *plan.refused_by[k + 1 :])
+            with pytest.raises(RefusalError, match=rf"refused_by\[{k}\]"):
+                verify_plan(replace(plan, refused_by=stated), problem, GAINS)
+
+
+def test_a_way_is_not_made_slower_until_a_limit_refuses_it(found):
+    """Gains for commands seven times as old are allowed to a plan, and need more time."""
+    problem, plan = found
+    slowly = reschedule(replace(plan, age_factor=SLOWEST_AGE), ScheduledGains(), "scheduled")
+    cell, most = max(enumerate(one.estimated_time for one in slowly.transitions), key=lambda pair: pair[1])
+    asked = limited(problem, max_transition_time=0.5 * most)
+    assert max(one.estimated_time for one in plan.transitions) < 0.5 * most
+    stated = replace(slowly, refused_by=(replace(SLOW, cell=cell, value=most, allowed=0.5 * most),))
+    assert verify_plan(plan, asked, GAINS).answer == "found"
+    with pytest.raises(RefusalError, match=r"age_factor: is 7\.0"):
+        verify_plan(stated, asked, GAINS)

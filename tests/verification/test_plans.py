@@ -81,7 +81,7 @@ def test_what_is_accepted_under_a_new_digest_is_true(document, tmp_path):
     assert 0 < len(accepted) < 0.5 * len(places)
     assert {way[0] for way in accepted} <= {"cells", "transitions"}
     claims = {way[2] for way in accepted if way[0] == "transitions"}
-    assert claims <= {"inradius", "estimated_time", "goal_lower", "goal_upper"}
+    assert claims <= {"inradius", "goal_lower", "goal_upper"}
 
 
 def assert_true(document, way):

@@ -116,7 +116,7 @@ def test_a_target_outside_the_next_region_is_refused():
 
 
 def test_a_goal_that_is_too_narrow_and_a_force_that_is_too_small_are_refused():
-    with pytest.raises(RefusalError, match=r"the goal's tolerance is 0\.005 m"):
+    with pytest.raises(RefusalError, match=r"the goal's tolerance leaves 0\.005 m"):
         check_position(plan(), 0.005)
     weak = replace(plan(), budget=replace(plan().budget, base_force=50.0))
     assert refusal(weak) == "budget.base_force"

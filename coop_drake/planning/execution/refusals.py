@@ -52,7 +52,9 @@ def _refusals(problem: PlanningProblem, plan: Plan) -> Iterator[Refusal]:
         limit = float(problem.limits.joint_accelerations[axis - 1])  # Of it, a share is planned with.
         values, joint = (limit * shares[:, axis]).tolist(), problem.tree.joints[axis - 1]
         unit: Unit = "rad/s^2" if joint.kind == "revolute" else "m/s^2"
-        yield from _broken(values, 1, "limits.joint_accelerations", limit, unit, joint.name)
+        cell = int(np.argmax(shares[:, axis]))
+        if shares[cell, axis] >= 1.0:  # The gains' limit acts, if it has not been left out.
+            yield Refusal("limits.joint_accelerations", cell, values[cell], limit, unit, joint.name)
 
 
 def _broken(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 import shapely
 from shapely import LineString, Point, Polygon
 
@@ -44,11 +45,12 @@ def check_position(plan: Plan, position_tolerance: float) -> list[Check]:
     checks = [
         Check("the object stays in its cells under the budget", len(plan.cells), least, "m to spare, least")
     ]
-    rest = plan.tube.rest
-    if not rest < position_tolerance:
-        finding = f"is {rest:.6g} m; the goal's tolerance is {position_tolerance:.6g} m"
+    rest, away = plan.tube.rest, float(np.hypot(*(plan.transitions[-1].target - plan.goal_pose[:2])))
+    room = position_tolerance - away
+    if not rest < room:
+        finding = f"is {rest:.6g} m; the goal's tolerance leaves {room:.6g} m about the last target"
         raise RefusalError("tube.rest", finding)
-    checks.append(Check("the object comes to rest at the goal", 1, position_tolerance - rest, "m to spare"))
+    checks.append(Check("the object comes to rest at the goal", 1, room - rest, "m to spare"))
     if plan.budget.base_force is not None:
         checks.append(_check_force(plan.tube, plan.budget, plan.budget.base_force))
     return checks
