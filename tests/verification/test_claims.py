@@ -26,7 +26,8 @@ from coop_drake.scenario import Deployment, load_scenario
 from coop_drake.scenario.limits import RobotLimits
 from coop_drake.typed_data import convert_class, field_types
 from coop_drake.verification import exact, verify_plan
-from coop_drake.verification.budgets import check_origin
+from coop_drake.verification.budgets import check as axes
+from coop_drake.verification.budgets import check_origin, position
 from coop_drake.verification.gains import check_ages
 from tests.support.certificates import GAINS, room_with_pillar
 from tests.support.last_cells import last_cells
@@ -147,7 +148,7 @@ def as_written(plan):
 
 @pytest.fixture(autouse=True)
 def once_each(monkeypatch):
-    """Ask the exact checker once about every geometry; most alterations leave it alone."""
+    """Ask once about every geometry and every loop, of which most alterations leave one alone."""
     known, ask = {}, exact.check
 
     def check(question, answer, progress):
@@ -164,7 +165,12 @@ def once_each(monkeypatch):
         return known[key]
 
     monkeypatch.setattr(exact, "check", check)
+    monkeypatch.setattr(position, "position_bounds", POSITION_BOUNDS)
+    monkeypatch.setattr(axes, "loop_of", LOOP_OF)
 
+
+POSITION_BOUNDS, LOOP_OF = cache(position.position_bounds), cache(axes.loop_of)
+"""Responses of the loops of a position and of axes, by their gains and their budget."""
 
 READ = ("target", "goal_lower", "goal_upper", "path", "neck", "length", "inradius")
 """Entries of a transition that the exact checker reads."""
