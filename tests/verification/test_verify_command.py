@@ -34,7 +34,7 @@ def test_both_answers_are_verified(planned, number, answer):
     assert result.exit_code == 0, result.stderr
     facts = json.loads(result.stdout)
     assert (facts["valid"], facts["answer"]) == (True, answer)
-    assert {"name", "count", "tightest", "unit"} == facts["checks"][0].keys()
+    assert {"name", "count", "tightest", "unit", "arrays"} == facts["checks"][0].keys()
     shown = invoke("verify", file, scenario)
     assert f"valid, {answer}: {facts['subject']}" in " ".join(shown.stdout.split())
     assert all(heading in shown.stdout for heading in ("checked", "times", "closest to refusal"))
