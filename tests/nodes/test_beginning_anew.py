@@ -67,6 +67,19 @@ def test_a_robot_at_rest_says_so_ten_times_a_second_and_begins_at_the_ordered_sa
     assert node.state == FOLLOWS
 
 
+def test_an_order_counts_in_the_turn_that_the_robot_knows(robots):
+    """Another robot, started again, may have counted other turns of the object's angle."""
+    node, measured, efforts = robots[0], at_start(), []
+    for turns in (0, 1, -3):
+        begin = 100 * len(efforts)
+        stand(node, measured, 31, begin)
+        node.hear([Begin(0, begin + 31, (*measured[-3:-1], measured[-1] + 2.0 * np.pi * turns))])
+        effort, _ = node.step((begin + 31) * PERIOD, measured, stopped=True)
+        assert node.state == FOLLOWS
+        efforts.append(effort)
+    np.testing.assert_allclose(efforts[1:], [efforts[0]] * 2, atol=1e-6)
+
+
 def test_a_robot_that_hears_the_order_too_late_stands_on(robots):
     node, measured = robots[0], at_start()
     stand(node, measured, 20)
