@@ -165,7 +165,7 @@ class Reporter:
     def note(self, sentences: Sequence[str]) -> None:
         """Show and note sentences about what a reader left out or assumed; without any nothing changes."""
         if sentences:
-            self.facts["notes"] = list(sentences)
+            self.facts["notes"] = [*self.facts.get("notes", ()), *sentences]
         for sentence in sentences:
             self.say(f"Note: {escape(sentence)}")
 

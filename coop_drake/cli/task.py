@@ -37,17 +37,21 @@ def read_task(path: Path, gains: str | None = None, reporter: Reporter | None = 
     Args:
         path: The file of the scenario.
         gains: As in `coop_drake.scenario.with_gains`.
-        reporter: Shows what the reader of the floor plan left out or assumed; None for nobody.
+        reporter: Shows what the reader of the floor plan left out or assumed, and joints whose kind and
+            limits differ; None for nobody.
 
     Raises:
         ScenarioError: The file, a model or the gain set is wrong.
         FloorPlanError: The floor plan cannot be read.
     """
-    from coop_drake.plant import planning_problem
+    from coop_drake.plant import joint_notes, planning_problem
     from coop_drake.scenario import load_scenario
     from coop_drake.scenario.gain_file import with_gains
 
     scenario = with_gains(load_scenario(path), gains)
     if reporter is not None:
         reporter.note(scenario.workspace.notes)
-    return Task(scenario, planning_problem(scenario))
+    problem = planning_problem(scenario)
+    if reporter is not None:
+        reporter.note(joint_notes(scenario, problem))
+    return Task(scenario, problem)

@@ -1,5 +1,6 @@
 from .component_tree import read_component_tree
 from .configuration import base_poses, set_configuration
+from .limit_notes import joint_notes
 from .planar_chain import BaseChain, base_chain, robot_chain
 from .problem import planning_problem
 from .robot import RobotPlant, build_robot_plant
@@ -22,6 +23,7 @@ __all__ = [
     "build_robot_plant",
     "build_separate_team",
     "build_team_plant",
+    "joint_notes",
     "planning_problem",
     "read_component_tree",
     "read_team_tree",

@@ -13,6 +13,7 @@ import numpy as np
 
 from coop_drake.errors import ScenarioError
 from coop_drake.files import check_readable
+from coop_drake.plant.limit_notes import limit_notes
 from coop_drake.tree.pose import FloatArray
 
 if TYPE_CHECKING:
@@ -69,12 +70,10 @@ def import_robot(path: Path, packages: Mapping[str, Path] | None = None) -> Impo
     for link in links:
         work.make_solid(link)
         work.mend_inertia(link)
-    for joint in root.iter("joint"):
-        work.compare_limits(joint)
     _filter_own(root, [str(link.get("name")) for link in links])
     text = ElementTree.tostring(root, encoding="unicode")
     work.files[path.name] = f'<?xml version="1.0"?>\n{text}\n'.encode()
-    return ImportedRobot(path.name, work.files, tuple(work.notes()))
+    return ImportedRobot(path.name, work.files, (*limit_notes(root), *work.notes()))
 
 
 def _parse(path: Path) -> Element:
@@ -102,8 +101,6 @@ class _Work:
     thickened: list[str] = field(default_factory=list)
     mended: list[str] = field(default_factory=list)
     squared: int = 0
-    endless: list[str] = field(default_factory=list)
-    limited: list[str] = field(default_factory=list)
 
     def notes(self) -> Iterator[str]:
         """Yield sentences about what was changed."""
@@ -115,11 +112,6 @@ class _Work:
             yield f"impossible inertia made round: {', '.join(self.mended)}"
         if self.squared:
             yield f"{self.squared} angles within {_NEARLY_RIGHT:g} rad of a right angle made right"
-        if self.endless:
-            yield f"revolute joints without limits are circles, as continuous ones: {', '.join(self.endless)}"
-        if self.limited:
-            kept = "do not count" if self.path.suffix == ".sdf" else "are kept, so that these are no circles"
-            yield f"limits of continuous joints {kept}: {', '.join(self.limited)}"
         yield "links of the robot are filtered from colliding with one another"
 
     def drop(self, element: Element) -> None:
@@ -137,15 +129,6 @@ class _Work:
                 if child.tag == "link":
                     child.attrib.pop("type", None)
                 self.drop(child)
-
-    def compare_limits(self, joint: Element) -> None:
-        """Note a joint whose kind and limits say different things about whether it is a circle."""
-        limit, kind, name = next(joint.iter("limit"), None), joint.get("type"), str(joint.get("name"))
-        known = limit is not None and any(limit.get(k) or limit.findtext(k) for k in ("lower", "upper"))
-        if kind == "revolute" and not known:
-            self.endless.append(name)
-        if kind == "continuous" and known:
-            self.limited.append(name)
 
     def _squared(self, rpy: str) -> str:
         """The angles, with rounded right angles corrected."""

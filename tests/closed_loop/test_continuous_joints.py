@@ -56,6 +56,7 @@ def test_a_turret_turns_through_pi_and_arrives(tmp_path, more):
     ran = invoke("run", path, "--out", tmp_path, "--no-figures", "--json")
     assert ran.exit_code == 0
     assert json.loads(ran.stdout)["outcome"] == "arrived"
+    assert "notes" not in json.loads(ran.stdout)
     assert invoke("verify", tmp_path / "plan.json", path).exit_code == 0
     assert invoke("verify", tmp_path / "log.npz", path).exit_code == 0
 
@@ -82,3 +83,20 @@ def test_a_robot_that_is_started_again_counts_turns_from_its_cell(sampled):
     node.step(0.0, at_start, stopped=True)
     assert node.place == Place(True, 0, 0)
     node.release()
+
+
+@pytest.mark.parametrize(
+    ("kind", "limits", "note"),
+    [
+        ("revolute", "", "turret.urdf: revolute joints without limits are circles, as continuous ones"),
+        (
+            "continuous",
+            'lower="-6.28" upper="6.28"',
+            "turret.urdf: limits of continuous joints are kept, so that these are no circles",
+        ),
+    ],
+)
+def test_a_plan_names_joints_whose_kind_and_limits_differ(tmp_path, kind, limits, note):
+    path = write_turret(tmp_path, 3.0, 3.3, kind=kind, limits=limits)
+    planned = invoke("plan", path, "--out", tmp_path, "--json", "--effort", 0)
+    assert json.loads(planned.stdout)["notes"] == [f"{note}: turret_joint"]
