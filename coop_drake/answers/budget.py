@@ -2,11 +2,23 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, field, fields, replace
+from math import inf
 from typing import Annotated
 
+import numpy as np
+
 from coop_drake.tree.bodies import BODY, Bodies
-from coop_drake.typed_data import EXACT, DataError, Limits, NotNegative, Positive, Vector, check_fields
+from coop_drake.typed_data import (
+    EXACT,
+    DataError,
+    Limits,
+    NotNegative,
+    Number,
+    Positive,
+    Vector,
+    check_fields,
+)
 
 _Exact = Annotated[NotNegative, EXACT]
 
@@ -17,7 +29,10 @@ SCALED = (
 """Departures that a budget of the same control rate has more or less of."""
 
 
-UNSAID = ("axes", "bodies", "rotors")
+LIMITS = "base_force", "base_torque", "joint_effort"
+"""Limits of efforts, which a plan with this budget keeps."""
+
+UNSAID = ("axes", "bodies", "bases", "rotors", "dampings")
 """Fields that a budget in a line says in other words, or not at all: what the models give."""
 
 
@@ -41,17 +56,21 @@ class Budget:
         axis_error: Largest such error of the acceleration of an axis, where the coupling of axes counts, too;
             null for the number of ``acceleration_error`` [rad/s^2 or m/s^2].
         report_age: How long a report of readiness may be used after it was made [s].
-        base_force: Largest force of a base with which the object's position is moved; null for no limit [N].
-        moved_mass: Largest mass that one robot moves, its own and its share of the object's; needed where
-            ``base_force`` is given [kg].
+        base_force: Largest force that a base is ever told to give, as the length of a vector; null for no
+            limit [N].
+        base_torque: Largest torque of a base, likewise [N m].
+        joint_effort: Largest effort of a joint, likewise [N m or N].
         axes: Whether angles and joints are part of the budget; false for the position alone.
-        bodies: The team's bodies, from which follows how much the rates of the axes accelerate them, each as
-            [component in the tree, mass [kg], centre of mass x, y [m], inertia [kg m^2]]; empty where
-            ``axis_error`` counts what the model's error leaves of this.
+        bodies: The team's bodies, from which follows how much the rates of the axes accelerate them and what
+            efforts move them, each as [component in the tree, mass [kg], centre of mass x, y [m], inertia
+            [kg m^2], robot that moves it], the object once for each robot with its share of the load; empty
+            where ``axis_error`` counts what the model's error leaves of the rates' accelerations.
+        bases: The frame of every robot's base, as [component, x, y [m]]; needed where an effort is limited.
         grasp_noise: Largest error with which the measured pose of a base, its joints and the object's pose
             place a grasp; null where nobody looks at it [m].
         turn_noise: Largest error with which they give the angle of the base; likewise [rad].
         rotors: Inertia that its rotor adds to every joint, empty or of shape (n,) [kg m^2 or kg].
+        dampings: Damping of every joint in the models, empty or of shape (n,) [N m s or N s/m].
     """
 
     control_rate: Annotated[float, Limits(at_least=1.0, at_most=1e4)] = 200.0
@@ -67,26 +86,59 @@ class Budget:
     axis_error: NotNegative | None = None
     report_age: NotNegative = 0.0
     base_force: Positive | None = None
-    moved_mass: Positive | None = None
+    base_torque: Positive | None = None
+    joint_effort: Positive | None = None
     axes: bool = True
     bodies: Bodies = ()
+    bases: tuple[tuple[Number, ...], ...] = ()
     rotors: tuple[_Exact, ...] = ()
     grasp_noise: NotNegative | None = None
     turn_noise: NotNegative | None = None
+    dampings: tuple[_Exact, ...] = ()
 
     def __post_init__(self) -> None:
         check_fields(self)
-        if self.base_force is not None and self.moved_mass is None:
-            raise DataError("moved_mass", None, "a positive number, because base_force is given")
         for i, body in enumerate(self.bodies):
-            if len(body) != len(BODY) or body[0] < 0.0 or body[0] % 1.0 or min(body[1], body[4]) < 0.0:
+            whole = len(body) == len(BODY) and not (body[0] % 1.0 or body[5] % 1.0)
+            if not whole or min(body[0], body[1], body[4], body[5]) < 0.0:
                 allowed = f"{', '.join(BODY)}, of which only x and y may be negative"
                 raise DataError(f"bodies[{i}]", body, allowed)
+        for i, base in enumerate(self.bases):
+            if len(base) != 3 or base[0] < 0.0 or base[0] % 1.0:
+                raise DataError(f"bases[{i}]", base, "component, x, y")
+        for name in LIMITS:
+            limit = getattr(self, name)
+            if limit is not None and not (self.axes and self.bodies and len(self.bases) == self.robots):
+                allowed = (
+                    "null without axes, bodies and the base of every robot: no effort is bounded without"
+                )
+                raise DataError(name, limit, allowed)
+
+    @property
+    def robots(self) -> int:
+        """Number of robots that move the bodies, 0 for a budget without bodies."""
+        return 1 + max((int(body[5]) for body in self.bodies), default=-1)
+
+    @property
+    def limited(self) -> bool:
+        """Whether an effort is limited."""
+        return any(getattr(self, name) is not None for name in LIMITS)
 
     @property
     def period(self) -> float:
         """Control period [s]."""
         return 1.0 / self.control_rate
+
+    def effort_limits(self, joints: int) -> list[float]:
+        """Return the limits of all efforts in the order of ``Tolerance.effort``, infinite for no limit."""
+        counts = self.robots, self.robots, joints
+        limits = [inf if getattr(self, name) is None else getattr(self, name) for name in LIMITS]
+        return [limit for limit, count in zip(limits, counts, strict=True) for _ in range(count)]
+
+    @property
+    def ahead(self) -> float:
+        """How far ahead robots compute efforts from the nominal axes: half a period and the lag [s]."""
+        return 0.5 * self.period + self.lag
 
     @property
     def axis_acceleration_error(self) -> float:
@@ -100,7 +152,7 @@ class Budget:
 
     def describe(self) -> str:
         """All bounds in a line."""
-        stated = {field.name: getattr(self, field.name) for field in fields(self) if field.name not in UNSAID}
+        stated = {one.name: getattr(self, one.name) for one in fields(self) if one.name not in UNSAID}
         text = ", ".join(f"{name} {value:.4g}" for name, value in stated.items() if value is not None)
         return text if self.axes else f"{text}, axes false"
 
@@ -128,6 +180,8 @@ class Tolerance:
         alarm: Level above which a measured departure of the axis is an alarm [rad or m].
         rate_alarm: The same for its rate [rad/s or m/s].
         entry_parts: Into how many parts the positions at the entry are cut, so that these bounds follow [-].
+        effort: Largest efforts that robots are told to give: the forces of all bases, their torques, then the
+            efforts of all joints; empty where the budget limits none [N, N m].
     """
 
     age_factor: Annotated[Positive, EXACT]
@@ -145,3 +199,4 @@ class Tolerance:
     alarm: Vector
     rate_alarm: Vector
     entry_parts: tuple[Annotated[int, Limits(at_least=1, at_most=64)], ...]
+    effort: Vector = field(default_factory=lambda: np.zeros(0))

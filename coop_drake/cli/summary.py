@@ -40,7 +40,7 @@ _UNTIL_RUN = ("answer", "planning took", "estimated transport")
 
 _MORE_ROWS = (
     ("departure of the object under its budget", "{tube_radius_m:.4f} m at most"),
-    ("base force for the position under it", "{tube_force_n:.1f} N at most"),
+    ("base force under it", "{budget_base_force_n:.1f} N at most"),
     ("slices made", "{slices}"),
     ("smallest path clearance in a cell", "{narrowest_neck_m:.3f} m"),
     ("gains", "{gains}"),
@@ -150,8 +150,10 @@ def plan_facts(plan: Plan) -> dict[str, Any]:
     if plan.budget is not None and plan.tube is not None:
         covered = "position, angles and joints" if plan.budget.axes else "the position, not angles and joints"
         budgeted = {"budget_holds_for": covered, "tube_radius_m": plan.tube.radius}
-        if plan.budget.moved_mass is not None:
-            budgeted["tube_force_n"] = plan.budget.moved_mass * plan.tube.acceleration
+        efforts = [one.tolerance.effort for one in plan.transitions if one.tolerance is not None]
+        if plan.budget.base_force is not None:
+            forces = [effort[: plan.budget.robots].max() for effort in efforts]
+            budgeted["budget_base_force_n"] = float(max(forces))
     return {
         **budgeted,
         "cells": len(plan.cells),

@@ -108,7 +108,7 @@ class LoopDepartures(NamedTuple):
             component of a measured pose, then of all measured states, shape (3 + 2 (3 N + n), 4).
         biases: Constant errors of the measured pose, shape (N, 3) [m, rad].
         odometry: Factors of the measured rates of bases, shape (N,) [-].
-        limits: Largest efforts, shape (3 N + n,) [N, N m].
+        limits: Largest efforts, of every robot those of ``limit_efforts``, shape (2 N + n,) [N, N m].
         floor: Coulomb friction [N], viscous friction [N s/m], acceleration of gravity along x [m/s^2], (3,).
         pushes: Place in ``LoopPlant.bases``, force [N], torque [N m], begin and end [s], shape (., 6).
         hearing: Errors of the clocks [s], and how late switches are heard [periods], shape (2, N).

@@ -25,6 +25,7 @@ from coop_drake.compiled_loop.watching import (
     watch,
     watch_room,
 )
+from coop_drake.laws.actuators import limit_efforts
 from coop_drake.laws.channels import carry_reports
 from coop_drake.laws.departure import quiet_margin
 from coop_drake.laws.nominal_axes import carry_axes
@@ -88,9 +89,10 @@ def update(
         time = sample * departures.times[0]
         compute(k, sample, sample, time, False, cells, team, nominal, departures, room, memory)
         _fail(k, sample, room.held, team, departures, memory)
-    for i in range(room.held.size):
-        limit = departures.limits[i]
-        memory.efforts[0, i] = min(max(memory.efforts[0, i], -limit), limit)
+    for k in range(team.yaws.size):
+        first, last = team.first[2, k], team.first[2, k + 1]
+        own = memory.efforts[0, 3 * k + first : 3 * k + 3 + last]
+        limit_efforts(departures.limits[2 * k + first : 2 * k + 2 + last], own)
     now = sample % memory.current.shape[0]
     cell = int(memory.current[now, 0])
     _lead_on(sample, cell, room.law, cells, nominal, departures, memory)

@@ -12,7 +12,6 @@ from pydrake.systems.primitives import (
     DiscreteTimeDelay,
     FirstOrderLowPassFilter,
     Gain,
-    Saturation,
     ZeroOrderHold,
 )
 
@@ -20,7 +19,7 @@ from coop_drake.diagram.radio import build_radio, seed_of
 from coop_drake.laws.channels import NOTHING
 from coop_drake.laws.sampling import whole_periods
 from coop_drake.scenario import Deafness, Deployment, Messages, PoseBias, RobotDepartures, Silence
-from coop_drake.systems import Interruption, LaggingEffort, LossyMeasurement, MeasurementNoise
+from coop_drake.systems import Interruption, LaggingEffort, LimitedEffort, LossyMeasurement, MeasurementNoise
 from coop_drake.tree.pose import FloatArray
 
 Holding: TypeAlias = DiscreteTimeDelay | ZeroOrderHold | LossyMeasurement
@@ -99,7 +98,7 @@ class Wrapping:
         """Return the effort of the actuators: after limits and lag."""
         size = effort.size()
         limits = effort_limits(self._deployment, size - 3)
-        blocks: list[tuple[str, LeafSystem]] = [("actuator_limits", Saturation(-limits, limits))]
+        blocks: list[tuple[str, LeafSystem]] = [("actuator_limits", LimitedEffort(limits))]
         lag, period = self._deployment.actuators.lag, self._deployment.period
         if lag and period is not None:
             blocks.append(("actuator_lag", LaggingEffort(size, lag, period, self._own.sample_offset)))
@@ -232,10 +231,10 @@ def _affine(factors: FloatArray, offsets: FloatArray) -> AffineSystem:
 
 
 def effort_limits(deployment: Deployment, joints: int) -> FloatArray:
-    """Return the largest base wrench and joint torques, shape (3 + n,)."""
+    """Return the largest force and torque of a base and the largest efforts of joints, shape (2 + n,)."""
     limits = deployment.actuators
     force, torque, effort = (
         _STRONGEST if limit is None else limit
         for limit in (limits.base_force, limits.base_torque, limits.joint_effort)
     )
-    return np.array([force, force, torque, *[effort] * joints])
+    return np.array([force, torque, *[effort] * joints])

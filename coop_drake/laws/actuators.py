@@ -2,10 +2,26 @@
 
 from __future__ import annotations
 
-from math import exp
+from math import exp, hypot
 
 from coop_drake.compiled import compiled
 from coop_drake.tree.pose import FloatArray
+
+
+@compiled
+def limit_efforts(limits: FloatArray, efforts: FloatArray) -> None:
+    """Cut the efforts of one robot to what its actuators can give; a base's force keeps its direction.
+
+    Args:
+        limits: Largest length of the base's force, largest torque, largest efforts of the joints, (2 + n,).
+        efforts: Base wrench and joint torques, shape (3 + n,) [N, N m]; those that are too large change.
+    """
+    force = hypot(efforts[0], efforts[1])
+    if force > limits[0]:
+        efforts[0] *= limits[0] / force
+        efforts[1] *= limits[0] / force
+    for i in range(1, limits.size):
+        efforts[1 + i] = min(max(efforts[1 + i], -limits[i]), limits[i])
 
 
 @compiled

@@ -15,7 +15,7 @@ from coop_drake.tree.pose import FloatArray, IntArray
 
 
 def disagreement_coupling(
-    tree: ComponentTree, moved: Sequence[Bodies], rotors: Sequence[float], joints: FloatArray
+    tree: ComponentTree, moved: Bodies, rotors: Sequence[float], joints: FloatArray
 ) -> FloatArray:
     """Return by how much the axes (theta, q...) are accelerated because robots push with other accelerations.
 
@@ -26,7 +26,7 @@ def disagreement_coupling(
 
     Args:
         tree: The team.
-        moved: The bodies that every robot moves, the object's with the robot's share of their masses.
+        moved: The bodies with the robots that move them, robot by robot, the object's with their shares.
         rotors: Inertia that its rotor adds to every joint, shape (n,), or empty for none [kg m^2 or kg].
         joints: Configurations of the joints, shape (configurations, n) [rad or m].
 
@@ -34,12 +34,10 @@ def disagreement_coupling(
         The acceleration of each axis over that by which each robot's command departs from that of all, shape
         (configurations, 1 + n) [rad/m, or - for a joint that slides].
     """
-    frames, every = frames_of(tree), tuple(body for bodies in moved for body in bodies)
-    chain = team_chain(tree, every, rotors)
-    owners = np.repeat(np.arange(len(moved)), [len(bodies) for bodies in moved])
-    links = np.array([int(body[0]) for body in every])
-    places = np.array([frames[int(body[0])].apply(np.array(body[2:4])) for body in every])
-    masses = np.array([body[1] for body in every])
+    frames, chain = frames_of(tree), team_chain(tree, moved, rotors)
+    owners, links = (np.array([int(body[i]) for body in moved]) for i in (5, 0))
+    places = np.array([frames[int(body[0])].apply(np.array(body[2:4])) for body in moved])
+    masses = np.array([body[1] for body in moved])
     squares = np.zeros((len(joints), 1 + joints.shape[1]))
     _add_squares(chain, (owners, links), places, masses, np.ascontiguousarray(joints), squares)
     coupling: FloatArray = np.sqrt(squares)

@@ -6,17 +6,17 @@ from functools import partial
 
 from pydrake.systems.framework import DiagramBuilder
 
-from coop_drake.answers.budget import Budget
+from coop_drake.answers.budget import LIMITS, Budget
 from coop_drake.answers.problem import PlanningProblem
 from coop_drake.errors import ScenarioError
 from coop_drake.laws import ScheduledGains
 from coop_drake.plant.component_tree import read_component_tree
 from coop_drake.plant.disagreement import largest_disagreement
-from coop_drake.plant.run_masses import bodies_of_team, joint_inertias, moved_masses
+from coop_drake.plant.run_masses import base_frames, joint_inertias, moved_bodies
 from coop_drake.plant.team import build_team_plant
 from coop_drake.scenario import Scenario
 from coop_drake.scenario.budget_file import ALL, POSITION, TeamMasses, read_budget
-from coop_drake.verification.budgets import OwnBudgets, ScenarioBudgets, wrong_masses
+from coop_drake.verification.budgets import Facts, OwnBudgets, ScenarioBudgets, wrong_facts
 
 
 def budget_of(choice: str | None, scenario: Scenario, problem: PlanningProblem) -> Budget | None:
@@ -39,8 +39,11 @@ def budget_of(choice: str | None, scenario: Scenario, problem: PlanningProblem) 
         raise ScenarioError(str(scenario.path), "gains.selected", name, allowed)
     choice, masses = choice or required, _of_models(scenario)
     budget = read_budget(choice, scenario, problem.tree, masses)
-    if wrong := wrong_masses(budget, masses.bodies, masses.rotors, max(masses.moved)):
+    if wrong := wrong_facts(budget, _facts(scenario, masses)):
         raise ScenarioError(choice, wrong[0], getattr(budget, wrong[0]), wrong[1])
+    if budget.limited and masses.springs:
+        allowed = "none where an effort is limited: no budget bounds what springs in the models take"
+        raise ScenarioError(str(scenario.path), "directives", "springs", allowed)
     return budget
 
 
@@ -56,17 +59,30 @@ def _own_budgets(scenario: Scenario, problem: PlanningProblem) -> OwnBudgets:
         ScenarioError: The scenario requires a budget, but has departures that none counts.
     """
     masses, own, missing = _of_models(scenario), dict[str, Budget](), ""
-    try:
-        for choice in (ALL, POSITION):
+    for choice in (ALL, POSITION):
+        try:
             own[choice] = read_budget(choice, scenario, problem.tree, masses)
-    except ScenarioError as error:
-        if scenario.deployment.budget != "none":
-            raise
-        missing = f"{error.key} is {error.shown}"
-    return OwnBudgets(own, missing, masses.bodies, masses.rotors, max(masses.moved))
+        except ScenarioError as error:
+            if scenario.deployment.budget == choice:
+                raise
+            missing = missing or f"{error.key} is {error.shown}"
+    return OwnBudgets(own, missing, _facts(scenario, masses))
+
+
+def _facts(scenario: Scenario, masses: TeamMasses) -> Facts:
+    """Return what no budget of a scenario may state otherwise."""
+    limits = {name: getattr(scenario.deployment.actuators, name) for name in LIMITS}
+    return Facts(masses.bodies, masses.bases, masses.rotors, masses.dampings, limits)
 
 
 def _of_models(scenario: Scenario) -> TeamMasses:
     team = build_team_plant(scenario, DiagramBuilder())
-    bodies, rotors = bodies_of_team(team, read_component_tree(team)), tuple(joint_inertias(team).tolist())
-    return TeamMasses(moved_masses(scenario, team), bodies, rotors, largest_disagreement(scenario, team))
+    context = team.plant.CreateDefaultContext()
+    return TeamMasses(
+        bodies=moved_bodies(scenario, team),
+        bases=base_frames(team, read_component_tree(team)),
+        rotors=tuple(joint_inertias(team).tolist()),
+        dampings=tuple(float(joint.GetDampingVector(context)[0]) for joint in team.joints),
+        disagreement=largest_disagreement(scenario, team),
+        springs=team.plant.num_force_elements() > 1,  # every plant has gravity
+    )

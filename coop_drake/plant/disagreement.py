@@ -6,10 +6,9 @@ import numpy as np
 
 from coop_drake.laws.disagreement import disagreement_coupling
 from coop_drake.plant.component_tree import read_component_tree
-from coop_drake.plant.run_masses import joint_inertias, team_masses
+from coop_drake.plant.run_masses import joint_inertias, moved_bodies
 from coop_drake.plant.team import TeamPlant
 from coop_drake.scenario import Scenario
-from coop_drake.tree.bodies import Bodies
 
 CONFIGURATIONS = 3000
 """Number of configurations that are tried [-]: ten times as many give some hundredths more for `elbow`."""
@@ -30,20 +29,3 @@ def largest_disagreement(scenario: Scenario, team: TeamPlant) -> float:
     )
     found = disagreement_coupling(tree, moved_bodies(scenario, team), joint_inertias(team).tolist(), joints)
     return float(found.max())
-
-
-def moved_bodies(scenario: Scenario, team: TeamPlant) -> list[Bodies]:
-    """Return the bodies that every robot moves: its own, and the object's with its share of their masses."""
-    masses, robots = team_masses(team, read_component_tree(team)), team.robots
-    moved = []
-    for k, robot in enumerate(robots):
-        load = scenario.load_share(robot.name, len(robots))
-        owned = ((body, {k: 1.0, None: load}.get(body.robot, 0.0)) for body in masses)
-        shares = [(body, share) for body, share in owned if share > 0.0]  # A share of the load may be zero.
-        moved.append(
-            tuple(
-                (float(body.component), share * body.mass, *body.p_CBcm.tolist(), share * body.inertia)
-                for body, share in shares
-            )
-        )
-    return moved

@@ -55,15 +55,28 @@ def run_setup(scenario: Scenario) -> RunSetup:
     )
 
 
-def moved_masses(scenario: Scenario, team: TeamPlant) -> tuple[float, ...]:
-    """Return the mass that every robot of a team moves: its own and its share of the object's [kg]."""
-    bodies = team_masses(team, read_component_tree(team))
-    own = [sum(body.mass for body in bodies if body.robot == k) for k in range(len(team.robots))]
-    load = sum(body.mass for body in bodies if body.robot is None)
-    return tuple(
-        mass + scenario.load_share(robot.name, len(own)) * load
-        for mass, robot in zip(own, team.robots, strict=True)
-    )
+def moved_bodies(scenario: Scenario, team: TeamPlant) -> Bodies:
+    """Return the bodies that robots move, robot by robot: its own, and its share of the object's masses."""
+    masses, moved = team_masses(team, read_component_tree(team)), []
+    for k, robot in enumerate(team.robots):
+        load = scenario.load_share(robot.name, len(team.robots))
+        shares = [(body, {k: 1.0, None: load}.get(body.robot, 0.0)) for body in masses]
+        moved += [
+            (*_properties(body, share), float(k)) for body, share in shares if share > 0.0
+        ]  # a share of the load may be zero
+    return tuple(moved)
+
+
+def base_frames(team: TeamPlant, tree: ComponentTree) -> tuple[tuple[float, ...], ...]:
+    """Return the component of every robot's base, and the origin of Bk in it [m]."""
+    plant, (groups, origins) = team.plant, component_bodies(team, tree)
+    context, frames = plant.CreateDefaultContext(), []
+    plant.SetPositionsAndVelocities(context, np.zeros(plant.num_multibody_states()))
+    for robot in team.robots:
+        component = next(i for i, group in enumerate(groups) if int(robot.base_body.index()) in group)
+        place = plant.EvalBodyPoseInWorld(context, robot.base_body).translation()[:2] - origins[component]
+        frames.append((float(component), *place.round(ROUNDED).tolist()))
+    return tuple(frames)
 
 
 def joint_inertias(team: TeamPlant) -> FloatArray:
@@ -73,11 +86,14 @@ def joint_inertias(team: TeamPlant) -> FloatArray:
 
 
 def bodies_of_team(team: TeamPlant, tree: ComponentTree) -> Bodies:
-    """Return the mass properties of all bodies of a team, for its rate terms and for budgets."""
-    return tuple(
-        (float(m.component), m.mass, *m.p_CBcm.round(ROUNDED).tolist(), m.inertia)
-        for m in team_masses(team, tree)
-    )
+    """Return the mass properties of all bodies of a team, for its rate terms, without their robots."""
+    return tuple(_properties(body, 1.0) for body in team_masses(team, tree))
+
+
+def _properties(body: BodyMass, share: float) -> tuple[float, ...]:
+    """Return the first five numbers of ``BODY`` for a share of a body's mass and inertia."""
+    place = body.p_CBcm.round(ROUNDED).tolist()
+    return float(body.component), share * body.mass, *place, share * body.inertia
 
 
 def component_bodies(team: TeamPlant, tree: ComponentTree) -> tuple[list[set[int]], list[FloatArray]]:

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from math import hypot
 from pathlib import Path
 from typing import NamedTuple
 
-from coop_drake.answers.budget import Budget
+from coop_drake.answers.budget import LIMITS, Budget
 from coop_drake.errors import ScenarioError
 from coop_drake.scenario.deployment import Floor, RobotDepartures
 from coop_drake.scenario.measured_bounds import grasp_bounds, rate_levers, wave_bounds
@@ -53,17 +52,21 @@ class TeamMasses(NamedTuple):
     """What a budget takes from the models of a team.
 
     Attributes:
-        moved: The mass that each robot moves, itself and its share of the object [kg].
-        bodies: As the field of ``Budget``.
-        rotors: As the field of ``Budget``.
+        bodies: As the field of ``Budget``; so are the next three.
+        bases: Frames of the bases.
+        rotors: Inertia of the rotors.
+        dampings: Damping of the joints.
         disagreement: Largest acceleration of an axis over that by which the robots' commands for the object's
             origin differ, see ``laws/disagreement.py`` [rad/m or -].
+        springs: Whether joints have springs.
     """
 
-    moved: Sequence[float]
     bodies: Bodies
+    bases: tuple[tuple[float, ...], ...]
     rotors: tuple[float, ...]
+    dampings: tuple[float, ...]
     disagreement: float
+    springs: bool
 
 
 def names_file(choice: str) -> bool:
@@ -90,6 +93,7 @@ def read_budget(choice: str, scenario: Scenario, tree: ComponentTree, masses: Te
     if not Path(choice).is_file():
         allowed = "all, position, or a file with a budget"
         raise ScenarioError(str(scenario.path), "--budget", choice, allowed)
+    _refuse_other_loops(scenario)
     budget: Budget = read_file(Budget, Path(choice))
     return budget
 
@@ -99,9 +103,10 @@ def _of_deployment(scenario: Scenario, tree: ComponentTree, masses: TeamMasses, 
     if deployment.control_rate is None or deployment.period is None:
         allowed = "a number, for a budget of the scenario's own departures"
         raise ScenarioError(str(scenario.path), "deployment.control_rate", None, allowed)
-    _refuse_uncounted(scenario)
+    _refuse_uncounted(scenario, axes=axes)
     measured, messages = deployment.measurements, deployment.messages
-    share = hypot(*masses.moved) / sum(masses.moved)  # errors of several robots rarely add up
+    moved = [sum(body[1] for body in masses.bodies if body[5] == k) for k in range(len(masses.bases))]
+    share = hypot(*moved) / sum(moved)  # errors of several robots rarely add up
     mean = PLANE_DEVIATIONS * share
     lost = REPORTS_LOST * deployment.period if messages.loss > 0.0 else 0.0
     waves, start = wave_bounds(measured.waves, tree), deployment.start_offset
@@ -124,36 +129,60 @@ def _of_deployment(scenario: Scenario, tree: ComponentTree, masses: TeamMasses, 
         axis_error=max(ACCELERATION_ERROR, DISAGREEMENT * masses.disagreement),
         report_age=messages.delay + lost,
         base_force=deployment.actuators.base_force,
-        moved_mass=max(masses.moved),
+        base_torque=deployment.actuators.base_torque,
+        joint_effort=deployment.actuators.joint_effort,
         axes=axes,
         bodies=masses.bodies if axes else (),
+        bases=masses.bases if axes else (),
         rotors=masses.rotors if axes else (),
         grasp_noise=grasp + GRASP_PLAY,
         turn_noise=turn + GRASP_PLAY,
+        dampings=masses.dampings if axes else (),
     )
 
 
-def _refuse_uncounted(scenario: Scenario) -> None:
-    """Refuse departures for which no budget provides, so that no plan is called tolerant of them.
+def _refuse_uncounted(scenario: Scenario, *, axes: bool) -> None:
+    """Refuse what no budget counts, so that no plan is called tolerant of it.
 
+    While a team is held its clock runs slower, and its axes are commanded otherwise than the tubes say.
     Wheels that are blocked or slip are faults, of which nobody calls a plan tolerant: they are simulated to
     see that the team stops.
     """
-    deployment = scenario.deployment
+    _refuse_other_loops(scenario)
+    deployment, control = scenario.deployment, scenario.control
     measured, actuators = deployment.measurements, deployment.actuators
+    limits = {f"deployment.actuators.{name}": getattr(actuators, name) for name in LIMITS}
     uncounted = {
-        "measurements.loss": measured.loss,
-        "measurements.late": measured.late,
-        "actuators.base_torque": actuators.base_torque,
-        "actuators.joint_effort": actuators.joint_effort,
-        "messages.repeat": deployment.messages.repeat,
-        "robots": {name: own for name, own in deployment.robots.items() if own.counted != RobotDepartures()},
-        "floor": None if deployment.floor == Floor() else deployment.floor,
-        "pushes": deployment.pushes,
+        "deployment.measurements.loss": measured.loss,
+        "deployment.measurements.late": measured.late,
+        "deployment.messages.repeat": deployment.messages.repeat,
+        "deployment.robots": {
+            name: own for name, own in deployment.robots.items() if own.counted != RobotDepartures()
+        },
+        "deployment.floor": None if deployment.floor == Floor() else deployment.floor,
+        "deployment.pushes": deployment.pushes,
     }
     for key, value in uncounted.items():
         if value:
             allowed = (
                 "nothing where a budget is asked for: none counts this; state a budget in a file instead"
             )
-            raise ScenarioError(str(scenario.path), f"deployment.{key}", value, allowed)
+            raise ScenarioError(str(scenario.path), key, value, allowed)
+    stated = {key: value for key, value in limits.items() if value is not None}
+    for key, value in stated.items():
+        if not axes:
+            allowed = (
+                "null with the budget position, which bounds no effort of angles and joints; or budget: all"
+            )
+            raise ScenarioError(str(scenario.path), key, value, allowed)
+        if control.hold is not None:
+            allowed = f"null where a budget is asked for and {key.removeprefix('deployment.')} is limited"
+            raise ScenarioError(str(scenario.path), "control.hold", control.hold, allowed)
+
+
+def _refuse_other_loops(scenario: Scenario) -> None:
+    """Refuse predictors and observers, which change the loops that tubes are computed for."""
+    for key in ("predictor", "observer"):
+        if getattr(scenario.control, key):
+            allowed = "false where a budget is asked for: its bounds are those of the loop without it"
+            raise ScenarioError(str(scenario.path), f"control.{key}", True, allowed)

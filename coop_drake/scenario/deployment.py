@@ -71,7 +71,7 @@ class ActuatorLimits:
     """Largest efforts of the actuators, null for no limit, and how quickly they follow their commands.
 
     Attributes:
-        base_force: Largest force of every base along each axis of W [N].
+        base_force: Largest force of every base, as the length of a vector [N].
         base_torque: Largest torque of every base [N m].
         joint_effort: Largest effort of every joint [N m or N].
         lag: Time constant with which every effort follows its command, as a first-order low pass [s]; 0 for
@@ -269,7 +269,7 @@ class Deployment:
     Attributes:
         preset: The departures of a usual team, which the keys beside it replace one by one. ``mobile_base``:
             200 Hz, measurements 10 ms late with noise of 1 mm, 0.5 mrad and 0.01 /s, masses believed 20 % too
-            large, base forces up to 300 N, actuators that lag by 5 ms, a fifth of the reports lost. A
+            large, base forces up to 1000 N, actuators that lag by 5 ms, a fifth of the reports lost. A
             scenario that was read holds the departures themselves.
         control_rate: How often controllers compute a new effort, which is held in between; null for
             controllers in continuous time [Hz].

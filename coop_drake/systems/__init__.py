@@ -15,6 +15,7 @@ from coop_drake.systems.hold_receiver import HoldReceiver
 from coop_drake.systems.hold_supervisor import HoldSupervisor
 from coop_drake.systems.interruption import Interruption
 from coop_drake.systems.lagging_effort import LaggingEffort
+from coop_drake.systems.limited_effort import LimitedEffort
 from coop_drake.systems.lossy_measurement import LossyMeasurement
 from coop_drake.systems.measurement_noise import MeasurementNoise
 from coop_drake.systems.message_channel import MessageChannel, clear_channel
@@ -57,6 +58,7 @@ __all__ = [
     "HoldSupervisor",
     "Interruption",
     "LaggingEffort",
+    "LimitedEffort",
     "LossyMeasurement",
     "MeasurementNoise",
     "MessageChannel",

@@ -17,6 +17,7 @@ from coop_drake.progress import Progress
 from coop_drake.verification.budgets import (
     ScenarioBudgets,
     check_budget,
+    check_efforts,
     check_origin,
     check_position,
 )
@@ -66,7 +67,7 @@ def verify_plan(
     ]
     checks += check_position(plan, problem.position_tolerance)
     axes = check_budget(plan, problem.tree)
-    checks += [] if axes is None else [axes]
+    checks += [*([] if axes is None else [axes]), *check_efforts(plan)]
     whose = f", {origin.name}" if origin is not None else ""
     return Verified(
         "found",

@@ -29,7 +29,6 @@ DEVIATIONS = 4.5
 BUDGET = Budget(
     control_rate=200.0, delay=0.01, lag=0.005, angle_noise=0.0005, rate_noise=0.01, position_noise=0.001,
     velocity_noise=0.02, single_noise=1.5, model_error=0.1, acceleration_error=0.2, report_age=0.03,
-    base_force=300.0, moved_mass=8.5,
 )  # fmt: skip
 
 
@@ -42,7 +41,7 @@ def run():
         control_rate=BUDGET.control_rate,
         mass_error=BUDGET.model_error,
         measurements=Measurements(*noise, delay=BUDGET.delay),
-        actuators=ActuatorLimits(base_force=BUDGET.base_force, lag=BUDGET.lag),
+        actuators=ActuatorLimits(lag=BUDGET.lag),
         messages=Messages(loss=0.2),
     )
     scenario = replace(scenario, goal=goal, limits={}, deployment=deployment)

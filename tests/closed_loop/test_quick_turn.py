@@ -32,7 +32,8 @@ def planned(counted=True):
     names, pose = tuple(scenario.start.joints), scenario.start.object
     joints = dict(zip(names, ARMS, strict=True))
     goal = ObjectPose(pose.x + 0.2, pose.y, pose.theta + TURN)
-    deployment = convert_class(Deployment.completed({"preset": "mobile_base"}, "deployment"), Deployment)
+    preset = {"preset": "mobile_base", "actuators": {"base_force": None}}
+    deployment = convert_class(Deployment.completed(preset, "deployment"), Deployment)
     scenario = replace(
         scenario, deployment=deployment, start=Start(pose, joints), limits={},
         goal=Goal(goal, joints, scenario.goal.tolerances),
@@ -81,10 +82,10 @@ def test_the_plan_is_checked_with_the_bodies_of_its_team():
     scenario, plan, _ = planned()
     tree = planning_problem(scenario).tree
     assert check_budget(plan, tree).tightest > 0.0
-    easily_turned = tuple((*body[:4], 0.1 * body[4]) for body in plan.budget.bodies)
+    easily_turned = tuple((*body[:4], 0.1 * body[4], body[5]) for body in plan.budget.bodies)
     for changes, where in (
         ({"bodies": easily_turned}, "tolerance"),
-        ({"bodies": ((9, 1.0, 0.0, 0.0, 0.1),)}, "budget.bodies"),
+        ({"bodies": ((9, 1.0, 0.0, 0.0, 0.1, 0.0),)}, "budget.bodies"),
         ({"rotors": (0.0,)}, "budget.rotors"),
     ):
         altered = replace(plan, budget=replace(plan.budget, **changes))

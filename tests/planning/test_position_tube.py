@@ -13,7 +13,7 @@ from coop_drake.answers import Plan
 from coop_drake.answers.budget import Budget
 from coop_drake.laws import ScheduledGains
 from coop_drake.laws.nominal import nominal_flow
-from coop_drake.planning.budget.position_fit import UnprovedPosition, fit_position
+from coop_drake.planning.budget.position_fit import UnprovedPosition, commanded_accelerations, fit_position
 from coop_drake.planning.budget.position_tube import PositionGains, position_tubes
 from coop_drake.planning.execution.transitions import with_gains
 from coop_drake.plant import planning_problem
@@ -94,7 +94,6 @@ def test_a_plan_with_other_gains_has_no_tube():
 
 LIMITS = {
     "rest": (replace(BUDGET, position_noise=0.02), r"may rest .* mm from the goal"),
-    "force": (replace(BUDGET, base_force=60.0), r"a base may need .* N to move the object's position"),
     "delay": (replace(BUDGET, delay=0.3), "is not stable"),
 }
 
@@ -108,13 +107,15 @@ def test_what_does_not_hold_is_said(name):
     assert re.search(said, found.reason)
 
 
-def test_slower_motion_is_chosen_where_a_force_is_limited():
+def test_slower_motion_is_chosen_where_accelerations_are_limited():
     scenario, plan = small_problem()
-    budget = replace(BUDGET, base_force=100.0)
-    found = fit_position(planning_problem(scenario), plan, ScheduledGains(), budget)
+    problem, gains = planning_problem(scenario), ScheduledGains()
+    accelerations = commanded_accelerations(problem, plan, gains, BUDGET)
+    assert accelerations == sorted(set(accelerations), reverse=True)
+    found = fit_position(problem, plan, gains, BUDGET, 17.0)
     assert isinstance(found, Plan)
     assert found.tube.speed < 1.0
-    assert found.tube.acceleration * budget.moved_mass <= budget.base_force
+    assert accelerations[-1] <= found.tube.acceleration <= 17.0
 
 
 def test_a_cell_that_is_too_narrow_is_named():

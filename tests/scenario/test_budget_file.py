@@ -5,22 +5,24 @@ from math import sqrt
 from types import SimpleNamespace
 
 import pytest
-from pydrake.systems.framework import DiagramBuilder
 
 import coop_drake
 from coop_drake.answers import Found, Undecided, load_plan
 from coop_drake.cli.simulate import read_plan
 from coop_drake.cli.task import read_task
 from coop_drake.errors import ScenarioError
-from coop_drake.plant import build_team_plant, planning_problem
+from coop_drake.plant import planning_problem
 from coop_drake.plant.budgets import budget_of
-from coop_drake.plant.run_masses import moved_masses
 from coop_drake.scenario import Deployment, Measurements
 from coop_drake.tree.levers import axis_levers
 from tests.support.cli import invoke
 from tests.support.scenarios import write_scenario
 
 PRESET = {"preset": "mobile_base"}
+
+
+UNLIMITED = {"actuators": {"base_force": None}}
+"""A budget for the position alone bounds no efforts."""
 
 
 def scenario(folder, **deployment):
@@ -32,10 +34,15 @@ def test_the_budget_of_a_preset(tmp_path):
     problem = planning_problem(found)
     budget = budget_of("all", found, problem)
     assert budget_of(None, found, problem) is None
-    assert budget_of("position", found, problem) == replace(budget, axes=False, bodies=(), rotors=())
+    with pytest.raises(ScenarioError, match="bounds no effort of angles and joints"):
+        budget_of("position", found, problem)
+    unlimited = coop_drake.load_scenario(scenario(tmp_path, **UNLIMITED))
+    alone = dict.fromkeys(("bodies", "bases", "rotors", "dampings"), ())
+    assert budget_of("position", unlimited, problem) == replace(budget, axes=False, base_force=None, **alone)
     assert sum(body[1] for body in budget.bodies) == pytest.approx(17.0)
-    assert moved_masses(found, build_team_plant(found, DiagramBuilder())) == pytest.approx((8.5, 8.5))
-    assert (budget.base_force, budget.moved_mass) == (300.0, pytest.approx(8.5))
+    moved = [sum(body[1] for body in budget.bodies if body[5] == k) for k in (0, 1)]
+    assert (budget.base_force, moved) == (1000.0, pytest.approx([8.5, 8.5]))
+    assert budget.bases == ((1.0, 0.35, 0.0), (2.0, -0.35, 0.0))
     assert (budget.delay, budget.lag, budget.model_error) == (0.01, 0.005, 0.2)
     assert budget.position_noise == pytest.approx(3.44 * 0.001 / sqrt(2.0))  # two robots of the same mass
     levers = budget.velocity_noise / (3.44 * 0.01 / sqrt(2.0))
@@ -59,7 +66,7 @@ def test_a_budget_counts_bounded_errors_with_their_worst_signs(tmp_path):
 
 
 def test_a_required_budget_is_planned_for_without_an_option(tmp_path):
-    file = scenario(tmp_path, budget="position")
+    file = scenario(tmp_path, budget="position", **UNLIMITED)
     result = invoke("plan", file, "--out", tmp_path / "out")
     assert result.exit_code == 0, result.output
     assert "the position, not angles and joints" in " ".join(result.output.split())
@@ -79,8 +86,9 @@ def test_a_plan_under_another_budget_than_the_required_one_is_refused(tmp_path):
         ("none", "all", "budget: is missing; the scenario requires `deployment.budget: all`"),
         ("position", "all", "budget.axes: is False; the scenario gives True"),
     ):
-        assert invoke("plan", scenario(tmp_path, budget=made), "--out", plan.parent).exit_code == 0
-        file = scenario(tmp_path, budget=asked)
+        without = scenario(tmp_path, budget=made, **UNLIMITED)
+        assert invoke("plan", without, "--out", plan.parent).exit_code == 0
+        file = scenario(tmp_path, budget=asked, **UNLIMITED)
         refused = invoke("verify", plan, file)
         assert (refused.exit_code, finding in " ".join(refused.output.split())) == (1, True), refused.output
         said = []
@@ -90,7 +98,7 @@ def test_a_plan_under_another_budget_than_the_required_one_is_refused(tmp_path):
 
 def test_a_budget_of_a_file_is_said_not_to_be_the_scenarios(tmp_path):
     (tmp_path / "budget.yaml").write_text("{position_noise: 0.001, axes: false}")
-    file = scenario(tmp_path, robots={"*": {"odometry_scale": 0.01}})
+    file = scenario(tmp_path, **UNLIMITED, robots={"*": {"odometry_scale": 0.01}})
     plan = tmp_path / "out" / "plan.json"
     assert invoke("plan", file, "--budget", tmp_path / "budget.yaml", "--out", plan.parent).exit_code == 0
     said = " ".join(invoke("verify", plan, file).output.split())
@@ -98,13 +106,13 @@ def test_a_budget_of_a_file_is_said_not_to_be_the_scenarios(tmp_path):
 
 
 def test_another_budget_than_the_required_one_is_planned_for_with_a_warning(tmp_path):
-    file = scenario(tmp_path, budget="all")
+    file = scenario(tmp_path, budget="all", **UNLIMITED)
     said = " ".join(invoke("plan", file, "--budget", "position", "--out", tmp_path / "out").output.split())
     assert "--budget position: the scenario requires the budget all; `verify` will refuse the plan" in said
 
 
 def test_a_required_budget_that_does_not_hold_is_a_negative_answer(tmp_path):
-    file = scenario(tmp_path, budget="position", measurements={"position_noise": 0.02})
+    file = scenario(tmp_path, budget="position", **UNLIMITED, measurements={"position_noise": 0.02})
     result = invoke("plan", file, "--out", tmp_path / "out")
     said = " ".join(result.output.split())
     assert result.exit_code == 4, result.output
@@ -126,7 +134,7 @@ def test_a_team_with_nothing_but_a_budget_is_ideal():
 
 
 def test_there_is_no_budget_for_gains_whose_funnels_never_close(tmp_path):
-    found = coop_drake.load_scenario(scenario(tmp_path, budget="position"))
+    found = coop_drake.load_scenario(scenario(tmp_path, budget="position", **UNLIMITED))
     fixed = replace(found, gains=replace(found.gains, selected="table_2"))
     with pytest.raises(ScenarioError, match="scheduled gains"):
         budget_of(None, fixed, planning_problem(found))
@@ -137,8 +145,6 @@ def test_there_is_no_budget_for_gains_whose_funnels_never_close(tmp_path):
     [
         ("measurements.loss", {"measurements": {"loss": 0.1}}),
         ("measurements.late", {"measurements": {"late": 0.1, "late_by": 0.005}}),
-        ("actuators.base_torque", {"actuators": {"base_torque": 50.0}}),
-        ("actuators.joint_effort", {"actuators": {"joint_effort": 50.0}}),
         ("messages.repeat", {"messages": {"repeat": 0.1}}),
         ("robots", {"robots": {"*": {"odometry_scale": 0.01}}}),
         ("floor", {"floor": {"slope": 0.01}}),
@@ -146,7 +152,7 @@ def test_there_is_no_budget_for_gains_whose_funnels_never_close(tmp_path):
     ],
 )
 def test_a_departure_that_no_budget_counts_is_refused(key, departures, tmp_path):
-    found = coop_drake.load_scenario(scenario(tmp_path, budget="position", **departures))
+    found = coop_drake.load_scenario(scenario(tmp_path, budget="all", **departures))
     with pytest.raises(ScenarioError, match="none counts this") as refused:
         budget_of(None, found, planning_problem(found))
     assert refused.value.key == f"deployment.{key}"

@@ -23,8 +23,6 @@ BUDGET = Budget(
     model_error=0.2,
     acceleration_error=0.2,
     report_age=0.03,
-    base_force=300.0,
-    moved_mass=8.5,
     axes=False,
 )
 """About that of the preset ``mobile_base``."""

@@ -225,10 +225,11 @@ def test_a_budget_that_is_too_large_is_answered_with_one_that_holds(folder, tmp_
         ("{delay: -1}", "delay"),
         ("{dealy: 1}", "dealy"),
         ("{model_error: 1.5}", "model_error"),
-        ("{bodies: [[9, 1, 0, 0, 1]], rotors: []}", "bodies"),
-        ("{bodies: [[0, 1, 0, 0, 1]]}", "the team's"),
+        ("{bodies: [[9, 1, 0, 0, 1, 0]], rotors: []}", "bodies"),
+        ("{bodies: [[0, 1, 0, 0, 1]]}", "component, mass, x, y, inertia, robot"),
+        ("{bodies: [[0, 1, 0, 0, 1, 0]]}", "the team's"),
         ("{rotors: [1, 1]}", "rotors"),
-        ("{base_force: 50, moved_mass: 1}", "8.5 kg, which a robot moves"),
+        ("{base_force: 50}", "null without axes, bodies and the base of every robot"),
     ],
 )
 def test_bad_budgets_are_bad_input(folder, tmp_path, text, key):

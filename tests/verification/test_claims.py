@@ -97,6 +97,7 @@ FREE = {
     "transitions[].tolerance.departure[]": Free(SAFE + ", less than what its distance leaves", (0.9,)),
     "transitions[].tolerance.rate_departure[]": Free(SAFE, (0.9,)),
     "transitions[].tolerance.entry_parts[]": Free("parts with which the sets follow; more follow closer"),
+    "transitions[].tolerance.effort[]": Free(SAFE + ", and at most its limit", (0.7, 1e9)),
     "axis_tracking.stiffness": Free(HELD, (0.5, 3.0)),
     "axis_tracking.damping": Free(HELD, (0.5, 3.0)),
     "tube.tracking_stiffness": Free(HELD, (0.5, 3.0)),
@@ -372,7 +373,10 @@ def test_a_budget_that_is_not_required_is_the_scenarios_own_or_said_not_to_be():
             {"model_error": 0.1},
             "the budget is not the scenario's: model_error is 0.1; the scenario gives 0.2",
         ),
-        ({"bodies": (), "rotors": ()}, "; it leaves out the masses of the team"),
+        (
+            {"axis_error": 0.5, "base_force": 900.0},
+            "the budget is not the scenario's: axis_error is 0.5; the scenario gives 0.35",
+        ),
     ):
         other = replace(plan, budget=replace(plan.budget, **smaller))
         assert said in verify_plan(other, one.problem, one.gains, budgets=free).subject
@@ -382,9 +386,11 @@ def test_a_budget_that_is_not_required_is_the_scenarios_own_or_said_not_to_be():
     ("changes", "where"),
     [
         ({"rotors": (100.0, 100.0)}, "budget.rotors"),
-        ({"bodies": (), "rotors": (1.0, 0.0)}, "budget.rotors"),
-        ({"bodies": ((0.0, 1.0, 0.0, 0.0, 1.0),)}, "budget.bodies"),
-        ({"moved_mass": 4.0}, "budget.moved_mass"),
+        ({"bodies": (), "bases": (), "base_force": None, "rotors": (1.0, 0.0)}, "budget.rotors"),
+        ({"bodies": ((0.0, 1.0, 0.0, 0.0, 1.0, 1.0),)}, "budget.bodies"),
+        ({"bases": ((1.0, 0.0, 0.0), (2.0, 0.0, 0.0))}, "budget.bases"),
+        ({"base_force": 2000.0}, "budget.base_force"),
+        ({"base_force": None}, "budget.base_force"),
     ],
 )
 def test_other_masses_than_the_teams_are_refused_in_any_budget(changes, where):

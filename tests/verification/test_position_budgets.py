@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from coop_drake.answers import load_plan, save_plan
-from coop_drake.answers.budget import Budget
+from coop_drake.answers.budget import LIMITS, Budget
 from coop_drake.errors import RefusalError
 from coop_drake.laws.nominal import nominal_flow
 from coop_drake.planning.budget.position_tube import SLACK, PositionGains, position_tubes
@@ -31,11 +31,10 @@ def refusal(altered):
 
 
 def test_the_plan_is_accepted_and_says_that_the_axes_are_not_part_of_it():
-    stays, rests, force = check_position(plan(), TOLERANCE)
+    stays, rests = check_position(plan(), TOLERANCE)
     assert stays.count == len(plan().cells)
     assert stays.tightest > 0.0
     assert rests.tightest == pytest.approx(TOLERANCE - plan().tube.rest)
-    assert force.tightest == pytest.approx(300.0 - BUDGET.moved_mass * plan().tube.acceleration)
     assert check_budget(plan()).name == "angles and joints are not part of the budget"
 
 
@@ -115,13 +114,12 @@ def test_a_target_outside_the_next_region_is_refused():
     assert refusal(with_transition(0, target=target, path=path, neck=1e-3)) == "transitions[0].target"
 
 
-def test_a_goal_that_is_too_narrow_and_a_force_that_is_too_small_are_refused():
+def test_a_goal_that_is_too_narrow_and_limits_without_axes_are_refused():
     with pytest.raises(RefusalError, match=r"the goal's tolerance leaves 0\.005 m"):
         check_position(plan(), 0.005)
-    weak = replace(plan(), budget=replace(plan().budget, base_force=50.0))
-    assert refusal(weak) == "budget.base_force"
-    with pytest.raises(DataError, match="moved_mass"):
-        Budget(base_force=50.0)
+    for name in LIMITS:
+        with pytest.raises(DataError, match="no effort is bounded without"):
+            Budget(**{name: 50.0})
 
 
 def test_an_object_that_may_be_faster_than_its_limit_is_refused():
@@ -148,7 +146,7 @@ def test_a_tube_without_a_budget_and_a_budget_without_a_tube_are_refused():
 def test_another_level_of_a_monitor_is_refused(name, factor):
     seen = replace(plan(), budget=replace(plan().budget, grasp_noise=0.01, turn_noise=0.006))
     alarms = replace(plan().alarms, grasp=0.01, turn=0.006)
-    assert len(check_position(replace(seen, alarms=alarms), TOLERANCE)) == 3
+    assert len(check_position(replace(seen, alarms=alarms), TOLERANCE)) == 2
     other = replace(alarms, **{name: factor * getattr(alarms, name)})
     assert refusal(replace(seen, alarms=other)) == f"alarms.{name}"
     if name in ("grasp", "turn"):

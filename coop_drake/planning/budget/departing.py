@@ -51,11 +51,13 @@ class Departures(NamedTuple):
         position: Largest |e| [rad or m].
         rate: Largest |e'| [rad/s or m/s].
         acceleration: Largest |e''| [rad/s^2 or m/s^2].
+        pull: Largest part of a command that pulls an axis to its nominal motion [rad/s^2 or m/s^2].
     """
 
     position: FloatArray
     rate: FloatArray
     acceleration: FloatArray
+    pull: FloatArray
 
 
 class _Scales(NamedTuple):
@@ -100,7 +102,7 @@ def departing(
     moving = np.stack([one.moving(samples, budget.period) for one in sets], axis=-1)
     entered = np.empty((*before.past.shape[:3], memory + samples + 1))
     entered[..., :memory] = before.past
-    found, state = np.empty((3, samples + 1, axes)), np.concatenate([before.state, before.state[1:]])
+    found, state = np.empty((4, samples + 1, axes)), np.concatenate([before.state, before.state[1:]])
     left = lag_factors(budget.period, budget.lag)[0]
     scales = _Scales(budget.period, budget.model_error, budget.axis_acceleration_error, loop.rest, left)
     responses = loop.kicks, loop.sums[:, :, LATE].copy(), loop.noises, loop.errors
@@ -164,7 +166,7 @@ def _carry(
             every period, shape (2, parts, axes, ...).
         state: Largest d until now, lagged pull, and the largest one from the first sample of leaving on; they
             change, shape (3, parts, axes).
-        found: Receives the departures, shape (3, periods, axes).
+        found: Receives the departures, shape (4, periods, axes).
     """
     kicks, late, noise, errors = responses
     parts, axes, memory, ever = len(errors), len(coupling), kicks.shape[2], found.shape[1] - 1
@@ -215,7 +217,7 @@ def _enter(
         moving: Largest |x^''| and |x^'| in it, shape (2, axes).
         model: Coefficients of c, and the largest |epsilon| of every part.
         scales: What all axes share.
-        found: Receives |e|, |e'| and |e''|, shape (3, axes).
+        found: Receives |e|, |e'|, |e''| and |q|, shape (4, axes).
         entered: Receives d and the part of it that causes e'_1, shape (2, parts, axes).
     """
     (coupling, errors), T, axes = model, scales.period, moving.shape[1]
@@ -233,6 +235,7 @@ def _enter(
             entered[0, p, i] = entered[1, p, i] + more + scales.rest * now[2, p, i]
             found[0, i] = max(found[0, i], now[0, p, i] + 0.125 * T * T * push)
             found[1, i], found[2, i] = max(found[1, i], now[1, p, i] + T * push), max(found[2, i], push)
+            found[3, i] = max(found[3, i], now[2, p, i])
 
 
 @compiled

@@ -14,8 +14,9 @@ from coop_drake.laws.axis_table import LEAVING_TIME, REST_RATE, REST_REACH, axis
 from coop_drake.laws.gains import IDEAL_AGE, RestCondition
 from coop_drake.planning.budget.alarms import axis_noises
 from coop_drake.planning.budget.axis_departure import SLACK, best_loop
-from coop_drake.planning.budget.coupling import cell_couplings
+from coop_drake.planning.budget.coupling import TeamCouplings, team_couplings
 from coop_drake.planning.budget.transitions import (
+    LimitedEfforts,
     ProvedTransition,
     UnprovedTransition,
     follow_transitions,
@@ -31,7 +32,12 @@ _UNSTABLE = UnprovedTransition(0, 0, "is not stable under the delay, the lag and
 
 
 def fit_budget(
-    problem: PlanningProblem, plan: Plan, gain_set: ScheduledGains, budget: Budget
+    problem: PlanningProblem,
+    plan: Plan,
+    gain_set: ScheduledGains,
+    budget: Budget,
+    acceleration: float = 0.0,
+    team: TeamCouplings | None = None,
 ) -> Plan | UnprovedTransition:
     """Choose gains for every transition so that a budget holds, the quickest that do.
 
@@ -42,6 +48,9 @@ def fit_budget(
         plan: A plan with the gains of the gain set.
         gain_set: The rule of its gains.
         budget: The departures to be tolerated.
+        acceleration: Largest acceleration that a robot commands for the object's origin, which counts where
+            efforts are limited [m/s^2].
+        team: What the masses couple in the plan's cells, computed where it is not given.
 
     Returns:
         The plan with these gains, the budget and what follows from it, with the times estimated before; or
@@ -60,8 +69,9 @@ def fit_budget(
             plans.append(with_gains(plans[0], gain_set.slowed(factors[len(plans)]), plan.gain_set))
         return axis_table(plans[choice].funnel(k), plans[choice].transitions[k].gains)
 
-    couplings = cell_couplings(budget, problem.tree, plan.cells)
-    found = follow_transitions(table_of, len(factors), couplings, plan.start[2:], loop)
+    couplings, efforts = team or team_couplings(budget, problem.tree, plan.cells)
+    limited = None if efforts is None else LimitedEfforts(efforts, acceleration)
+    found = follow_transitions(table_of, len(factors), couplings.rates[:, 1:], plan.start[2:], loop, limited)
     if isinstance(found, UnprovedTransition):
         return found
     fitted = tuple(
@@ -105,5 +115,6 @@ def _tolerance(factor: float, passed: ProvedTransition, budget: Budget) -> Toler
         rate_departure=passed.rate_departure,
         alarm=passed.departure + noise,
         rate_alarm=passed.rate_departure + rate_noise,
+        effort=passed.effort,
         entry_parts=tuple(sets.parts for sets in every),
     )

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from math import sqrt
+from math import inf, sqrt
 
 import numpy as np
 import shapely
@@ -88,7 +88,7 @@ _UNSTABLE = UnprovedPosition(
 
 
 def fit_position(
-    problem: PlanningProblem, plan: Plan, gain_set: ScheduledGains, budget: Budget
+    problem: PlanningProblem, plan: Plan, gain_set: ScheduledGains, budget: Budget, most: float = inf
 ) -> Plan | UnprovedPosition:
     """Choose gains and regions with which the object's position holds under a budget, the quickest that do.
 
@@ -97,6 +97,7 @@ def fit_position(
         plan: A plan with the gains of the gain set.
         gain_set: The rule of its gains.
         budget: The departures to be tolerated.
+        most: Largest acceleration that robots may command for the object's origin [m/s^2].
 
     Returns:
         The plan with the tube and these regions; or what cannot be shown.
@@ -104,7 +105,7 @@ def fit_position(
     stiffest = max(transition.gains.stiffness for transition in plan.transitions)
     tried = []
     for share in SOFTER:
-        tried.append(_fastest(problem, plan, gain_set, budget, share * stiffest))
+        tried.append(_fastest(problem, plan, gain_set, budget, share * stiffest, most))
         if isinstance(tried[-1], Plan) and tried[-1].tube is not None and tried[-1].tube.speed >= QUICK:
             break
     plans = [found for found in tried if isinstance(found, Plan)]
@@ -119,7 +120,7 @@ def unproved_position(
     slowest = []
     for share in SOFTER:
         tubes = _tubes(share * stiffest, gain_set, budget)
-        found = [_narrowest_allowed(of_speed, budget, problem, plan) for of_speed in tubes]
+        found = [_narrowest_allowed(of_speed, problem, plan) for of_speed in tubes]
         limits = [one for one in found if isinstance(one, UnprovedPosition)]
         if len(limits) < len(found):
             return None
@@ -127,8 +128,31 @@ def unproved_position(
     return replace(slowest[0] if slowest else _UNSTABLE, whatever_cells=True)
 
 
+def commanded_accelerations(
+    problem: PlanningProblem, plan: Plan, gain_set: ScheduledGains, budget: Budget
+) -> list[float]:
+    """Return the accelerations that robots may command for the object's origin, the largest first [m/s^2].
+
+    They are those of all speeds of p_G, and of softer governors below the least of these.
+    """
+    stiffest = max(transition.gains.stiffness for transition in plan.transitions)
+    found = list[float]()
+    for share in SOFTER:
+        tubes = [
+            _narrowest_allowed(some, problem, plan) for some in _tubes(share * stiffest, gain_set, budget)
+        ]
+        least = min(found, default=inf)
+        found += [t.acceleration for t in tubes if isinstance(t, PositionTube) and t.acceleration < least]
+    return sorted(set(found), reverse=True)
+
+
 def _fastest(
-    problem: PlanningProblem, plan: Plan, gain_set: ScheduledGains, budget: Budget, stiffness: float
+    problem: PlanningProblem,
+    plan: Plan,
+    gain_set: ScheduledGains,
+    budget: Budget,
+    stiffness: float,
+    most: float,
 ) -> Plan | UnprovedPosition:
     """Return a plan with one K for all transitions, and a speed of p_G that is quicker than a slower one.
 
@@ -137,7 +161,7 @@ def _fastest(
     uniform, best = _with_stiffness(plan, stiffness, gain_set), None
     found: Plan | UnprovedPosition = _UNSTABLE
     for tubes in _tubes(stiffness, gain_set, budget):
-        tube = _narrowest_allowed(tubes, budget, problem, uniform)
+        tube = _narrowest_allowed(tubes, problem, uniform, most)
         if isinstance(tube, UnprovedPosition):
             found = tube
             continue
@@ -173,18 +197,18 @@ def _tubes(
 
 
 def _narrowest_allowed(
-    tubes: Sequence[PositionTube], budget: Budget, problem: PlanningProblem, plan: Plan
+    tubes: Sequence[PositionTube], problem: PlanningProblem, plan: Plan, most: float = inf
 ) -> PositionTube | UnprovedPosition:
     """Return the narrowest tube that is allowed, as stiff loops take large forces; or why none is."""
-    found = _not_allowed(tubes[0], budget, problem, plan)
-    allowed = (tube for tube in tubes if _not_allowed(tube, budget, problem, plan) is None)
+    found = _not_allowed(tubes[0], problem, plan, most)
+    allowed = (tube for tube in tubes if _not_allowed(tube, problem, plan, most) is None)
     return tubes[0] if found is None else next(allowed, found)
 
 
 def _not_allowed(
-    tube: PositionTube, budget: Budget, problem: PlanningProblem, plan: Plan
+    tube: PositionTube, problem: PlanningProblem, plan: Plan, most: float
 ) -> UnprovedPosition | None:
-    """Return what the tube itself does not allow: a force, a speed, or a rest too far from the goal."""
+    """Return what the tube itself does not allow: a speed, a rest too far from the goal, an acceleration."""
     fastest = plan.transitions[0].gains.speed_limit
     if fastest is not None and tube.velocity > fastest:
         return UnprovedPosition(
@@ -196,10 +220,11 @@ def _not_allowed(
             f"the object may rest {1e3 * tube.rest:.1f} mm from the goal; the goal's tolerance allows "
             f"{1e3 * allowed:.1f} mm"
         )
-    if budget.base_force is not None and budget.moved_mass is not None:
-        force = budget.moved_mass * tube.acceleration
-        if force > budget.base_force:
-            return UnprovedPosition(f"a base may need {force:.0f} N to move the object's position")
+    if tube.acceleration > most:
+        return UnprovedPosition(
+            f"robots may command {tube.acceleration:.1f} m/s^2 for the object's origin; their limits of "
+            f"efforts leave {most:.1f} m/s^2"
+        )
     return None
 
 

@@ -14,9 +14,16 @@ from coop_drake.answers.problem import PlanningProblem
 from coop_drake.errors import GeometryError, PlanError, StallError
 from coop_drake.laws import ScheduledGains
 from coop_drake.planning.boxes.channel import Channel, CoveredPath
+from coop_drake.planning.budget.coupling import TeamCouplings, team_couplings
 from coop_drake.planning.budget.fitting import fit_budget
-from coop_drake.planning.budget.position_fit import UnprovedPosition, fit_position, unproved_position
+from coop_drake.planning.budget.position_fit import (
+    UnprovedPosition,
+    commanded_accelerations,
+    fit_position,
+    unproved_position,
+)
 from coop_drake.planning.budget.transitions import UnprovedTransition
+from coop_drake.planning.execution.estimate import plan_time
 from coop_drake.planning.improvement.quickest import quickest_plan
 from coop_drake.progress import Progress
 
@@ -85,7 +92,7 @@ def tolerant_plan(
     tried: list[_Tried] = []
     plans = _plans(problem, found, gain_set, gain_set_name, budget, progress)
     for plan in plans:
-        fitted = _fitted(problem, plan, gain_set, budget)
+        fitted = _fitted(problem, plan, gain_set, budget, team_couplings(budget, problem.tree, plan.cells))
         if isinstance(fitted, Plan):
             return fitted
         tried.append((plan, fitted))
@@ -149,9 +156,10 @@ def _beyond(
     best, said = 0.0, _sentence(*tried[0])
     widest_first = sorted(tried, key=lambda one: -_narrowest_goal(one[0]))  # these bear most
     for plan, unproved in chain(widest_first, ((plan, tried[0][1]) for plan in others)):
+        team = team_couplings(budget, problem.tree, plan.cells)
         low, high, share = best, 1.0, best + SHARE_STEP if best > 0.0 else 0.5
         while high - low > ROUNDED * SHARE_STEP:
-            found = _fitted(problem, plan, gain_set, budget.scaled(share))
+            found = _fitted(problem, plan, gain_set, budget.scaled(share), team)
             if isinstance(found, Plan):
                 low = share
             else:
@@ -165,27 +173,58 @@ def _beyond(
 
 
 def _fitted(
-    problem: PlanningProblem, plan: Plan, gain_set: ScheduledGains, budget: Budget
+    problem: PlanningProblem, plan: Plan, gain_set: ScheduledGains, budget: Budget, team: TeamCouplings
 ) -> Plan | UnprovedTransition | UnprovedPosition:
     """Return a plan with gains, sets and regions under which its budget holds; or where it does not."""
     unproved = unproved_position(problem, plan, gain_set, budget)  # first, for it takes far less time
     if unproved is not None:
         return unproved
-    if budget.axes:
-        fitted = fit_budget(problem, plan, gain_set, budget)
-        if isinstance(fitted, UnprovedTransition):
-            return fitted
-        plan = fitted
-    return fit_position(problem, plan, gain_set, budget)
+    if not budget.axes:
+        return fit_position(problem, plan, gain_set, budget)
+    if budget.limited:
+        return _within_limits(problem, plan, gain_set, budget, team)
+    fitted = fit_budget(problem, plan, gain_set, budget, team=team)
+    if isinstance(fitted, UnprovedTransition):
+        return fitted
+    return fit_position(problem, fitted, gain_set, budget)
+
+
+def _within_limits(
+    problem: PlanningProblem, plan: Plan, gain_set: ScheduledGains, budget: Budget, team: TeamCouplings
+) -> Plan | UnprovedTransition | UnprovedPosition:
+    """Return the quickest plan whose efforts stay within their limits; or what does not hold.
+
+    What the position may take of an effort is lowered, for which it gets slower, until there is enough left
+    for the axes, and as long as the plan gets quicker by it.
+    """
+    best: Plan | None = None
+    failed: UnprovedTransition | UnprovedPosition | None = None
+    for acceleration in commanded_accelerations(problem, plan, gain_set, budget):
+        found: Plan | UnprovedTransition | UnprovedPosition
+        found = fit_budget(problem, plan, gain_set, budget, acceleration, team)
+        if isinstance(found, Plan):
+            found = fit_position(problem, found, gain_set, budget, acceleration)
+        if not isinstance(found, Plan):
+            failed = found
+        elif best is not None and plan_time(found) >= plan_time(best):
+            break
+        else:
+            best = found
+    if best is not None:
+        return best
+    assert failed is not None  # some acceleration is allowed, see unproved_position
+    return failed
 
 
 def _sentence(plan: Plan, unproved: UnprovedTransition | UnprovedPosition) -> str:
     """Say where a budget does not hold, with the names of the robot and of the joint."""
     if isinstance(unproved, UnprovedPosition):
         return unproved.reason
+    where = f"in transition {unproved.transition} of 0 to {len(plan.transitions) - 1}"
+    if unproved.axis is None:
+        return f"{where}, {unproved.reason}"
     name = "the object's angle"
     if unproved.axis > 0:
         robot, _, joint = plan.joint_names[unproved.axis - 1].rpartition("::")
         name = f"the joint {joint} of {robot}" if robot else f"the joint {joint}"
-    last = len(plan.transitions) - 1
-    return f"in transition {unproved.transition} of 0 to {last}, {name} {unproved.reason}"
+    return f"{where}, {name} {unproved.reason}"

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
+from coop_drake.answers.budget import Budget
 from coop_drake.laws.axis_table import (
     ACCELERATION_LIMIT,
     GOAL_LOWER,
@@ -21,6 +23,7 @@ from coop_drake.planning.budget.alarms import least_distance
 from coop_drake.planning.budget.axis_departure import SLACK, AxisLoop
 from coop_drake.planning.budget.axis_sets import AxisSets, Entry, axis_sets
 from coop_drake.planning.budget.axis_tube import AxisConditions
+from coop_drake.planning.budget.coupling import QUICKEST, Efforts
 from coop_drake.planning.budget.departing import Departures, Inflow, at_rest, departing
 from coop_drake.planning.budget.leaving import first_leaving, next_entry
 from coop_drake.planning.budget.rate_room import comes_near_limit
@@ -47,18 +50,30 @@ ENTRY_PARTS = (1, 3)
 """Parts into which the positions at an entry are cut, tried in this order [-]."""
 
 
+class LimitedEfforts(NamedTuple):
+    """What limits efforts.
+
+    Attributes:
+        efforts: What efforts accelerations take in every cell.
+        acceleration: Largest acceleration that a robot commands for the object's origin [m/s^2].
+    """
+
+    efforts: Efforts
+    acceleration: float
+
+
 @dataclass(frozen=True)
 class UnprovedTransition:
     """The first transition for which a budget cannot be shown to hold.
 
     Attributes:
         transition: Index of the transition.
-        axis: Index of the axis, theta being 0.
+        axis: Index of the axis, theta being 0; None where the reason names an effort.
         reason: What cannot be shown, in words.
     """
 
     transition: int
-    axis: int
+    axis: int | None
     reason: str
 
 
@@ -73,6 +88,7 @@ class ProvedTransition:
         spare: Least distances of the axes to their funnels' bounds, shape (axes,) [rad or m].
         departure: Largest departures from them, shape (axes,) [rad or m].
         rate_departure: Largest departures of the rates, shape (axes,) [rad/s or m/s].
+        effort: Largest efforts, as a ``Tolerance`` states them.
         inflow: What has entered the loops of its axes when the next one begins.
         choice: Number of the gains that it has.
     """
@@ -83,6 +99,7 @@ class ProvedTransition:
     spare: FloatArray
     departure: FloatArray
     rate_departure: FloatArray
+    effort: FloatArray
     inflow: Inflow
     choice: int = 0
 
@@ -93,6 +110,7 @@ def follow_transitions(
     couplings: FloatArray,
     start: FloatArray,
     loop: AxisLoop,
+    limited: LimitedEfforts | None = None,
 ) -> list[ProvedTransition] | UnprovedTransition:
     """Follow all axes through transitions: their nominal motions, and how far they depart from these.
 
@@ -105,11 +123,14 @@ def follow_transitions(
         couplings: How much rates accelerate the axes in every cell, see ``cell_couplings``.
         start: Where they rest at the beginning, shape (axes,) [rad or m].
         loop: The loop that pulls the axes to their nominal motions, with the budget.
+        limited: What limits efforts, None where nothing does.
     """
     proved, choice, furthest, failed = list[ProvedTransition](), 0, -1, 0
     limit = UnprovedTransition(0, 0, "")
     while (k := len(proved)) < len(couplings):
-        found = _attempt(k, table_of(choice, k).copy(), couplings[k], proved[-1] if proved else start, loop)
+        found = _attempt(
+            k, table_of(choice, k).copy(), couplings[k], proved[-1] if proved else start, loop, limited
+        )
         if not isinstance(found, UnprovedTransition):
             proved.append(replace(found, choice=choice))
             choice = 0
@@ -125,7 +146,12 @@ def follow_transitions(
 
 
 def _attempt(
-    k: int, table: FloatArray, coupling: FloatArray, before: ProvedTransition | FloatArray, loop: AxisLoop
+    k: int,
+    table: FloatArray,
+    coupling: FloatArray,
+    before: ProvedTransition | FloatArray,
+    loop: AxisLoop,
+    limited: LimitedEfforts | None,
 ) -> ProvedTransition | UnprovedTransition:
     """Return what holds for transition k, entered from the one before or from rest; or what does not hold."""
     budget, T = loop.budget, loop.budget.period
@@ -139,7 +165,7 @@ def _attempt(
         return every
     found, inflow = departing(loop, every, coupling, inflow, first_leaving(table, every, T))
     found = Departures(*((1.0 + OTHERWISE) * one for one in found))
-    departure, rate_departure, push = (one.max(axis=0) for one in found)
+    departure, rate_departure, push, _ = (one.max(axis=0) for one in found)
     spare = np.array([(1.0 - SLACK) * sets.spare(found.position[:, i]) for i, sets in enumerate(every)])
     needed = least_distance(budget, len(every))
     for axis, sets in enumerate(every):
@@ -151,7 +177,34 @@ def _attempt(
             return UnprovedTransition(k, axis, "may exceed the limit of its rate")
         if not (1.0 + SLACK) * sets.acceleration + push[axis] <= table[axis, ACCELERATION_LIMIT]:
             return UnprovedTransition(k, axis, "may exceed the limit of its acceleration")
-    return ProvedTransition(table, entries, every, spare, departure, rate_departure, inflow)
+    effort = np.zeros(0) if limited is None else _effort(k, limited, every, found, budget)
+    if isinstance(effort, UnprovedTransition):
+        return effort
+    return ProvedTransition(table, entries, every, spare, departure, rate_departure, effort, inflow)
+
+
+def _effort(
+    k: int, limited: LimitedEfforts, every: Sequence[AxisSets], found: Departures, budget: Budget
+) -> FloatArray | UnprovedTransition:
+    """Return the largest efforts that robots are told to give in a transition, or which exceeds its limit.
+
+    Robots compute them by masses that are too large by the model's error at most, from accelerations that
+    they command and from nominal rates, ``ahead`` of now.
+    """
+    moving = np.stack([one.moving(len(found.pull) - 1, budget.period) for one in every], axis=-1)
+    rates = moving[1] + max(budget.ahead - budget.period, 0.0) * moving[0]
+    if rates.max() > QUICKEST:
+        return UnprovedTransition(k, int(rates.max(axis=0).argmax()), "may turn too fast to bound efforts")
+    of, commands = limited.efforts, moving[0] + found.pull
+    turning = commands @ of.axes[k].T + np.einsum("tj,ejk,tk->te", rates, of.rates[k], rates)
+    damped = (rates @ of.damping.T).max(axis=0)
+    moved = limited.acceleration * of.push[k] + turning.max(axis=0)
+    effort: FloatArray = (1.0 + SLACK) * ((1.0 + budget.model_error) * moved + damped)
+    if (effort <= of.limits).all():
+        return effort
+    worst = int((effort / of.limits).argmax())
+    said = f"{of.names[worst]} may be told to give {effort[worst]:.0f}, more than its {of.limits[worst]:.0f}"
+    return UnprovedTransition(k, None, said)
 
 
 def _entries(before: ProvedTransition, conditions: AxisConditions, periods: int) -> list[Entry]:

@@ -129,13 +129,13 @@ def departures(
         leaving: The first sample at which the cell can be left.
 
     Returns:
-        Largest |e|, |e'| and |e''|, shape (periods + 1, 3, axes), the last one for ever; and what enters.
+        Largest |e|, |e'|, |e''| and |q|, shape (periods + 1, 4, axes), the last one for ever; what enters.
     """
     T, memory, ever = loop.budget.period, loop.recent.shape[1], len(moving) - 1
     entered = np.concatenate([before.recent, np.empty((*before.recent.shape[:3], ever + 1))], axis=3)
     largest, lagging, kept = before.largest.copy(), before.lagging.copy(), before.lagging.copy()
     gone = exp(-T / loop.budget.lag) if loop.budget.lag > 0.0 else 0.0
-    found = np.empty((ever + 1, 3, moving.shape[2]))
+    found = np.empty((ever + 1, 4, moving.shape[2]))
     for k in range(ever):
         answers = entered[..., k : memory + k] @ loop.recent
         largest = np.maximum(largest, entered[0, :, :, memory + k - 1])
@@ -176,13 +176,13 @@ def _state(
 def _period(
     loop: Loop, coupling: FloatArray, moving: FloatArray, state: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Return |e|, |e'| and |e''| in one period, (3, axes), and what enters in it, (2, p, axes)."""
+    """Return |e|, |e'|, |e''| and |q| in one period, (4, axes), and what enters in it, (2, p, axes)."""
     T, (fastest, rates) = loop.budget.period, moving
     terms = _terms(coupling, rates)
     own = loop.errors * (fastest + terms) + loop.budget.axis_acceleration_error
     more = _terms(coupling, rates + (state[3] + T * own).max(axis=0)) - terms
     push = (1.0 + loop.budget.model_error) * state[2] + own + more
-    found = np.stack([state[0] + T * T / 8.0 * push, state[1] + T * push, push]).max(axis=1)
+    found = np.stack([state[0] + T * T / 8.0 * push, state[1] + T * push, push, state[2]]).max(axis=1)
     return found, np.stack([own + more + loop.spread * state[2], own])
 
 

@@ -21,9 +21,10 @@ from coop_drake.tree.pose import FloatArray, IntArray
 from coop_drake.verification.budgets.alarms import alarms_of, check_axis_alarms
 from coop_drake.verification.budgets.axis_departure import Loop, departures, loop_of, resting
 from coop_drake.verification.budgets.axis_law import Axes, axes_of
+from coop_drake.verification.budgets.couplings import couplings
+from coop_drake.verification.budgets.efforts import Asked, asked, check_stated_efforts
 from coop_drake.verification.budgets.entering import entering, first_rest
 from coop_drake.verification.budgets.rate_room import check_rate_room
-from coop_drake.verification.budgets.rate_terms import couplings
 from coop_drake.verification.budgets.staying import Closed, staying, tails
 from coop_drake.verification.budgets.tubes import Nominal, tubes
 from coop_drake.verification.checks import Check
@@ -56,7 +57,7 @@ def check_budget(plan: Plan, tree: ComponentTree | None = None) -> Check | None:
         return None if plan.budget is None else Check("angles and joints are not part of the budget", 0)
     loop, terms = _loop(plan), _coupling(plan, tree)
     entered = resting(loop, plan.start.size - 2)
-    smallest, count, entry = np.inf, 0, _start(plan)
+    smallest, count, entry, every = np.inf, 0, _start(plan), list[Asked]()
     for k, transition in enumerate(plan.transitions):
         stated, where = transition.tolerance, f"transitions[{k}]"
         if stated is None:
@@ -70,7 +71,11 @@ def check_budget(plan: Plan, tree: ComponentTree | None = None) -> Check | None:
         away, entered = departures(loop, terms[k], motion.moving, entered, motion.leaving)
         _check_departures(transition, motion, away, f"{where}.tolerance")
         check_axis_alarms(alarms_of(plan), stated, plan.budget, f"{where}.tolerance")
+        every.append(asked(plan.budget, motion.moving, away[:, 3]))
         smallest, count = min(smallest, float(stated.distance.min())), count + stated.distance.size
+    if plan.budget.limited:
+        assert tree is not None  # a budget with limits has bodies
+        check_stated_efforts(plan, tree, every)
     return Check(
         "axes stay in their funnels under the budget", count, smallest, "rad or m to a funnel's bound"
     )
@@ -95,7 +100,11 @@ def _coupling(plan: Plan, tree: ComponentTree | None) -> FloatArray:
         raise RefusalError("budget.bodies", f"expected components below {len(tree.components)}")
     if len(plan.budget.rotors) not in (0, axes - 1):
         raise RefusalError("budget.rotors", f"has {len(plan.budget.rotors)} numbers, not {axes - 1}")
-    return couplings(plan.budget, tree, plan.cells)
+    if len(plan.budget.dampings) not in (0, axes - 1):
+        raise RefusalError("budget.dampings", f"has {len(plan.budget.dampings)} numbers, not {axes - 1}")
+    if max((base[0] for base in plan.budget.bases), default=0) >= len(tree.components):
+        raise RefusalError("budget.bases", f"expected components below {len(tree.components)}")
+    return couplings(plan.budget, tree, plan.cells).rates[:, 1:]
 
 
 class _Motion(NamedTuple):

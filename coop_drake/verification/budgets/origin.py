@@ -21,23 +21,38 @@ NOT_THE_SCENARIOS = "the budget is not the scenario's"
 
 
 @dataclass(frozen=True)
+class Facts:
+    """What is no departure, but a fact about the team or its actuators.
+
+    Attributes:
+        bodies: The team's bodies, as in a budget.
+        bases: The frames of its bases, likewise.
+        rotors: What its rotor adds to every joint's inertia, shape (n,) [kg m^2 or kg].
+        dampings: Damping of every joint, shape (n,) [N m s or N s/m].
+        limits: The scenario's limits of efforts by their names in a budget, None for no limit [N, N m].
+    """
+
+    bodies: Bodies
+    bases: tuple[tuple[float, ...], ...]
+    rotors: tuple[float, ...]
+    dampings: tuple[float, ...]
+    limits: Mapping[str, float | None]
+
+
+@dataclass(frozen=True)
 class OwnBudgets:
     """What a scenario's section ``deployment`` and its models give for budgets.
 
     Attributes:
         by_name: The budgets of the section, ``all`` and ``position``; empty where no budget counts what
             stands there.
-        missing: Why it is empty, in words.
-        bodies: The team's bodies, as in a budget.
-        rotors: What its rotor adds to every joint's inertia, shape (n,) [kg m^2 or kg].
-        moved_mass: Largest mass that a robot moves [kg].
+        missing: Why one is missing, in words.
+        facts: What every budget must have in common with the scenario.
     """
 
     by_name: Mapping[str, Budget]
     missing: str
-    bodies: Bodies
-    rotors: tuple[float, ...]
-    moved_mass: float
+    facts: Facts
 
 
 @dataclass(frozen=True)
@@ -57,8 +72,8 @@ def check_origin(budget: Budget | None, scenario: ScenarioBudgets) -> Check | No
     """Say whose budget a plan has; None where neither plan nor scenario has one.
 
     A budget that is not the scenario's is accepted where none is required, but not with other masses than
-    the team's: they are no departures, but facts. It may leave out the bodies, whose part ``axis_error`` then
-    has to count.
+    the team's or larger efforts than its actuators': they are no departures, but facts. It may leave out the
+    bodies where no effort is limited; ``axis_error`` then has to count their part.
 
     Args:
         budget: What the plan states.
@@ -80,29 +95,32 @@ def check_origin(budget: Budget | None, scenario: ScenarioBudgets) -> Check | No
     for name, own in team.by_name.items():
         if not _difference(budget, own):
             return Check(f"the budget is that of the scenario's deployment, {name}", 1)
-    if wrong := wrong_masses(budget, team.bodies, team.rotors, team.moved_mass):
+    if wrong := wrong_facts(budget, team.facts):
         raise RefusalError(f"budget.{wrong[0]}", f"is {shortened(getattr(budget, wrong[0]))}, not {wrong[1]}")
-    away = _difference(budget, team.by_name["all"]) if team.by_name else None
+    away = _difference(budget, team.by_name["all"]) if "all" in team.by_name else None
     why = team.missing if away is None else " ".join(away)
     left_out = "; it leaves out the masses of the team" if budget.axes and not budget.bodies else ""
     return Check(f"{NOT_THE_SCENARIOS}: {why}{left_out}", 0)
 
 
-def wrong_masses(
-    budget: Budget, bodies: Bodies, rotors: tuple[float, ...], moved_mass: float
-) -> tuple[str, str] | None:
-    """Return a field of a budget with masses that are not the team's, and what is allowed; None if all are.
+def wrong_facts(budget: Budget, facts: Facts) -> tuple[str, str] | None:
+    """Return a field of a budget that is not as the facts are, and what is allowed; None if all are.
 
-    Bodies may be left out, with rotors; rotors may be left out where they add nothing. Arguments as in
-    ``OwnBudgets``.
+    Bodies may be left out, with all that belongs to them; what is zero may be left out, too.
     """
-    if budget.bodies and not _same(budget.bodies, bodies):
-        return "bodies", f"the team's, {shortened(bodies)}, or none"
-    due = rotors if budget.bodies else (0.0,) * len(rotors)
-    if not _same(budget.rotors or (0.0,) * len(rotors), due):
-        return "rotors", f"those of the team's bodies, {list(due)}"
-    if budget.moved_mass is not None and not budget.moved_mass >= moved_mass * (1.0 - SAME):
-        return "moved_mass", f"at least {moved_mass:.6g} kg, which a robot moves"
+    if budget.bodies and not _same(budget.bodies, facts.bodies):
+        return "bodies", f"the team's, {shortened(facts.bodies)}, or none"
+    if budget.bases and not _same(budget.bases, facts.bases):
+        return "bases", f"the team's, {shortened(facts.bases)}, or none"
+    for name in ("rotors", "dampings"):
+        own = getattr(facts, name)
+        nothing = (0.0,) * len(own)
+        if not _same(getattr(budget, name) or nothing, due := own if budget.bodies else nothing):
+            return name, f"those of the team's bodies, {list(due)}"
+    for name, limit in facts.limits.items():
+        stated = getattr(budget, name)
+        if limit is not None and (stated is None or stated > limit):
+            return name, f"at most {limit:g}, which the scenario's actuators can give"
     return None
 
 

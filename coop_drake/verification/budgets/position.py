@@ -1,4 +1,4 @@
-"""Check that the object's position holds under a plan's budget: its tube, its regions and its forces."""
+"""Check that the object's position holds under a plan's budget: its tube and its regions."""
 
 from __future__ import annotations
 
@@ -51,8 +51,6 @@ def check_position(plan: Plan, position_tolerance: float) -> list[Check]:
         finding = f"is {rest:.6g} m; the goal's tolerance leaves {room:.6g} m about the last target"
         raise RefusalError("tube.rest", finding)
     checks.append(Check("the object comes to rest at the goal", 1, room - rest, "m to spare"))
-    if plan.budget.base_force is not None:
-        checks.append(_check_force(plan.tube, plan.budget, plan.budget.base_force))
     return checks
 
 
@@ -118,13 +116,3 @@ def _check_path(plan: Plan, k: int) -> None:
             raise RefusalError(f"{where}.target", "is outside a governed set that it joins")
         if not float(held.boundary.distance(target)) >= transition.inradius - ROUNDING:
             raise RefusalError(f"{where}.inradius", "is more than the governed sets leave")
-
-
-def _check_force(tube: PositionTube, budget: Budget, limit: float) -> Check:
-    assert budget.moved_mass is not None  # a budget with a force limit has it
-    force = budget.moved_mass * tube.acceleration
-    if not force <= limit:
-        raise RefusalError(
-            "budget.base_force", f"is {limit:.6g} N; moving the position may take {force:.6g} N"
-        )
-    return Check("no base needs more than its force to move the position", 1, limit - force, "N to spare")

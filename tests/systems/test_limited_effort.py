@@ -1,0 +1,34 @@
+import numpy as np
+import pytest
+
+from coop_drake.systems import LimitedEffort
+from tests.support.system_checks import assert_every_input_is_required, port_sizes
+
+LIMITS = np.array([5.0, 2.0, 0.5])
+
+
+def given(asked):
+    block = LimitedEffort(LIMITS)
+    context = block.CreateDefaultContext()
+    block.get_input_port().FixValue(context, asked)
+    return block.get_output_port().Eval(context)
+
+
+def test_ports():
+    block = LimitedEffort(LIMITS)
+    assert port_sizes(block) == ({"asked": 4}, {"given": 4})
+    assert_every_input_is_required(block, {"asked": np.zeros(4)}, {"given": {"asked"}})
+
+
+def test_a_force_is_limited_by_its_length_and_keeps_its_direction():
+    np.testing.assert_allclose(given([6.0, -8.0, 0.0, 0.0]), [3.0, -4.0, 0.0, 0.0], rtol=1e-15)
+    np.testing.assert_array_equal(given([4.0, 3.0, 0.0, 0.0]), [4.0, 3.0, 0.0, 0.0])
+
+
+def test_torques_and_joints_are_limited_one_by_one():
+    np.testing.assert_array_equal(given([0.0, 1.0, -3.0, 0.7]), [0.0, 1.0, -2.0, 0.5])
+
+
+def test_a_limit_of_zero_is_refused():
+    with pytest.raises(ValueError, match="needs positive limits"):
+        LimitedEffort(np.array([1.0, 0.0]))
