@@ -111,7 +111,8 @@ def _sizes(_: Sequence[Row]) -> list[Row]:
         deployment = replace(transport.scenario.deployment, mass_error=error, seed=index)
         begun = RunRecord(index, "base", "compiled", index, json.dumps({"mass_error": error}), arrived=False)
         digest = sha256(str(index).encode()).hexdigest()
-        records.append(replace(begun, digest=digest, **vars(run(transport, deployment))))
+        outcome = vars(run(transport, deployment))
+        records.append(replace(begun, digest=digest, **{n: outcome[n] for n in outcome.keys() & vars(begun)}))
     with BytesIO() as file:
         parquet.write_table(table_of(records, RunRecord), file)
         size = file.tell() / BATCH

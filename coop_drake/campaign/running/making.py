@@ -95,7 +95,8 @@ class RunMaker:
             scenario = self._variation.scenario_of(run)
             digest = run_digest(scenario, self._digest_of(plan), self._tier, self._models_of(scenario))
             if self._tier == "compiled":
-                return replace(begun, digest=digest, **vars(self._compiled(scenario, plan, maps)))
+                outcome = vars(self._compiled(scenario, plan, maps))
+                return replace(begun, digest=digest, **{n: outcome[n] for n in outcome.keys() & vars(begun)})
             log, blocks = self._simulated(scenario, plan, maps)
             record = record_of_log(run, begun.scenario, log, plan, digest, blocks)
         except (OSError, MemoryError):
