@@ -29,7 +29,9 @@ class LoopCells(NamedTuple):
         numbers: Inradius R [m], K with which the cell is entered [1/s^2], longest time in it [s] and the
             target [m], shape (C, 5).
         goal: Goal position, shape (2,) [m].
-        tolerances: Largest distance to it that counts as arrived, for robots and for the run, shape (2,) [m].
+        tolerance: Largest distance of the nominal position to it that counts as arrived [m].
+        places: Of every robot the ``place`` of its ``ArrivalGoal``, one after the other, shape (3 N + n,).
+        rooms: Of every robot its tolerances there, then its errors, shape (2, 2 N + n).
     """
 
     first: IntArray
@@ -42,7 +44,9 @@ class LoopCells(NamedTuple):
     slices: FloatArray
     numbers: FloatArray
     goal: FloatArray
-    tolerances: FloatArray
+    tolerance: float
+    places: FloatArray
+    rooms: FloatArray
 
 
 class LoopPlant(NamedTuple):
@@ -100,8 +104,7 @@ class LoopDepartures(NamedTuple):
 
     Attributes:
         times: Control period, longest time of the run, lag of the actuators [s], shape (3,).
-        periods: Age of measurements, rows of a line of measurements, periods that a report travels, samples
-            over which rates are averaged, shape (4,).
+        periods: Age of measurements, rows of a line of measurements, periods that a report travels, (3,).
         seeds: Of every robot and use, see ``seed_of``, shape (N, 7).
         probabilities: Of lost and of late measurements, of lost and of repeated reports, shape (4,) [-].
         errors: Standard deviation of the noise, and size, length in periods and phase of the wave of every
@@ -147,7 +150,8 @@ class LoopMemory(NamedTuple):
         axes: x^, x^' and a^ of all axes, ring (D, 3, M).
         jumps: What fades, shape (M,).
         jumped: To which cell every robot's jumps belong, shape (N,).
-        rates: Rates of the last samples, ring (samples, 3 N + n).
+        recent: Poses and own joints that robots measured at the last samples in the last cell, infinite
+            before there are so many, ring (2 W, 3 N + n).
         efforts: Commands that actuators follow, shape (2, 3 N + n): what is held, and what acts [N, N m].
         channels: What the channels of reports hold, shape (N, ``channel_rows``, 2).
         reports: What robots report, and what they said last before a silence, shape (2, N, 2).
@@ -165,7 +169,7 @@ class LoopMemory(NamedTuple):
     axes: FloatArray
     jumps: FloatArray
     jumped: FloatArray
-    rates: FloatArray
+    recent: FloatArray
     efforts: FloatArray
     channels: FloatArray
     reports: FloatArray

@@ -10,10 +10,11 @@ import numpy as np
 from coop_drake.compiled_loop.arrays import LoopDepartures, LoopMemory, LoopNominal
 from coop_drake.compiled_loop.preparing import CompiledTransport
 from coop_drake.diagram.disturbances import blocked_times, downhill, wheel_slips
-from coop_drake.diagram.knowledge import report_periods, rest_samples
+from coop_drake.diagram.knowledge import report_periods
 from coop_drake.diagram.radio import seed_of
 from coop_drake.diagram.wrapping import effort_limits, measurement_deviations, measurement_waves
 from coop_drake.errors import ScenarioError
+from coop_drake.laws.arrival import mean_samples
 from coop_drake.laws.axis_table import first_jumps
 from coop_drake.laws.chain_motion import INERTIA, MASS
 from coop_drake.laws.channels import NOTHING, channel_rows
@@ -22,7 +23,6 @@ from coop_drake.laws.sampling import whole_periods
 from coop_drake.scenario import Deployment
 from coop_drake.systems.current_cell import READY_SIZE
 from coop_drake.systems.departure_monitor import LONG_AGO
-from coop_drake.systems.ready_monitor import MOVING
 from coop_drake.systems.team_kernels import FusedTeam
 from coop_drake.tree.pose import FloatArray
 
@@ -85,7 +85,6 @@ def departures_of(transport: CompiledTransport, deployment: Deployment) -> LoopD
             whole_periods(m.delay, period),
             max(whole_periods(m.late_by, period), 1),
             whole_periods(messages.delay, period),
-            rest_samples(deployment),
         ]),
         seeds=np.array([[seed_of(deployment, k, use) for use in range(_USES)] for k in range(len(names))]),
         probabilities=np.array([m.loss, m.late, messages.loss, messages.repeat]),
@@ -158,7 +157,7 @@ def memory_of(transport: CompiledTransport, departures: LoopDepartures) -> LoopM
         axes=np.tile([transport.first_axes, nothing, nothing], (ring, 1, 1)),
         jumps=first_jumps(transport.cells.tables[0], transport.first_axes),
         jumped=np.zeros(robots),
-        rates=np.full((max(int(departures.periods[3]), 1), efforts), MOVING),
+        recent=np.full((2 * mean_samples(float(departures.times[0])), efforts), inf),
         efforts=np.zeros((2, efforts)),
         channels=np.full((robots, channels, READY_SIZE), NOTHING),
         reports=np.full((2, robots, READY_SIZE), NOTHING),

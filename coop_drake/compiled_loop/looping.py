@@ -131,15 +131,13 @@ def compute(
     cell, time = heard_cell(k, sample, now, departures, memory)
     lead(k, sample, cell, time, cells, team, nominal, departures, memory, room)
     row = follow_axes(k, sample, cell, time, cells, team, nominal, departures, memory, room)
-    led, led_robot, judged = room.seen[row], room.robots[row, : measured.size], row
-    if departures.periods[3] > 0 and cell + 1 == cells.rows.shape[0]:
-        judged = 3
+    led, led_robot = room.seen[row], room.robots[row, : measured.size]
+    margin = report(k, sample, cell, time, led, led_robot, cells, nominal, departures, memory, begin, whole)
+    if cell + 1 == cells.rows.shape[0]:
         own = 3 * begin - 2 * team.first[2, k]
-        _average(sample, own, led, led_robot, memory, room.seen[judged], room.robots[judged, : measured.size])
-    margin = report(
-        k, sample, cell, time, room.seen[judged], room.robots[judged, : measured.size], cells, nominal,
-        departures, memory, begin, whole,
-    )  # fmt: skip
+        newest = memory.recent[sample % memory.recent.shape[0], own : own + 3 + joints]
+        for i in range(newest.size):
+            newest[i] = room.pose[i] if i < 3 else measured[i]
     if nominal.levels.size:
         judge(k, sample, now, team, cells, nominal, departures, memory, room, measured)
         margin = quiet_margin(margin, memory.alarms[k, 0])
@@ -148,36 +146,6 @@ def compute(
         remember_switch(k, cell, time, led, led_robot, cells, memory, begin)
     memory.governors[k, 0] += departures.times[0] * governed[0]
     memory.governors[k, 1] += departures.times[0] * governed[1]
-
-
-@compiled
-def _average(
-    sample: int, at: int, led: FloatArray, robot: FloatArray, memory: LoopMemory, judged: FloatArray,
-    judged_robot: FloatArray,
-) -> None:  # fmt: skip
-    """Write both states with the means of the last rates, and remember those of now.
-
-    Args:
-        sample: Number of the sample.
-        at: The robot's first column in ``memory.rates``.
-        led: The object's state, shape (6,).
-        robot: The robot's, shape (2 (3 + n_k),).
-        memory: Holds the last rates.
-        judged: Receives the object's state, shape (6,).
-        judged_robot: Receives the robot's, shape (2 (3 + n_k),).
-    """
-    n = robot.size // 2
-    for i in range(6):
-        judged[i] = led[i]
-    for i in range(2 * n):
-        judged_robot[i] = robot[i]
-    for i in range(n):
-        mean = memory.rates[:, at + i].mean()
-        if i < 3:
-            judged[3 + i] = mean
-        else:
-            judged_robot[n + i] = mean
-        memory.rates[sample % memory.rates.shape[0], at + i] = led[3 + i] if i < 3 else robot[n + i]
 
 
 @compiled

@@ -138,7 +138,9 @@ def _cells(scenario: Scenario, plan: Plan, knowledge: Sequence[RobotKnowledge], 
         np.array([[cell.lower for cell in plan.cells], [cell.upper for cell in plan.cells]]),
         np.array(numbers),
         np.array(plan.goal_pose[:2], dtype=float),
-        np.array([knowledge[0].position_tolerance, scenario.goal.tolerances.position]),
+        float(knowledge[0].position_tolerance),
+        np.concatenate([known.goal.place for known in knowledge]),
+        np.concatenate([np.array([known.goal.tolerances, known.goal.errors]) for known in knowledge], axis=1),
     )
 
 

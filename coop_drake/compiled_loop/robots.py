@@ -8,6 +8,7 @@ import numpy as np
 
 from coop_drake.compiled import compiled
 from coop_drake.compiled_loop.arrays import LoopCells, LoopDepartures, LoopMemory, LoopNominal
+from coop_drake.laws.arrival import arrival_margin
 from coop_drake.laws.axis_table import bounds_of, track_axes, write_jumps
 from coop_drake.laws.departure import alarm_at, axis_level, largest_departure
 from coop_drake.laws.load_sharing import end_effector_command
@@ -15,7 +16,7 @@ from coop_drake.laws.nominal_axes import carry_axes, place_on_axes, pull_axes
 from coop_drake.laws.robot_dynamics import robot_effort
 from coop_drake.systems.governor_kernels import govern
 from coop_drake.systems.nominal_kernels import accelerate_along, show_nominal
-from coop_drake.systems.ready_kernels import axes_ready, robot_ready, robot_ready_along
+from coop_drake.systems.ready_kernels import axes_ready, robot_arrived, robot_ready, robot_ready_along
 from coop_drake.systems.team_kernels import FusedTeam
 from coop_drake.tree.pose import FloatArray
 
@@ -33,8 +34,8 @@ class RobotRoom(NamedTuple):
     Attributes:
         pose: The object's pose as the robot knows it, shape (3,).
         seen: The object's state as the robot knows it, then on the nominal axes of now, and of when efforts
-            act, and with means of the last rates, shape (4, 6).
-        robots: The robot's own state in the same four ways, shape (4, 2 (3 + n)).
+            act, shape (3, 6).
+        robots: The robot's own state in the same three ways, shape (3, 2 (3 + n)).
         governed: What ``lead`` writes, shape (4,) [m/s, m/s^2].
         told: What the robot tells the log, see ``TOLD``.
         law: What the law of all axes asks for, shape (M,).
@@ -66,7 +67,7 @@ class RobotRoom(NamedTuple):
 def robot_room(memory: LoopMemory) -> RobotRoom:
     """Return room for a team."""
     axes, state, channel = memory.jumps.size, memory.state.size, memory.channels.shape
-    seen, robots, later, efforts = np.empty((4, 6)), np.empty((4, state)), np.empty((3, axes)), memory.efforts
+    seen, robots, later, efforts = np.empty((3, 6)), np.empty((3, state)), np.empty((3, axes)), memory.efforts
     return RobotRoom(
         np.empty(3), seen, robots, np.empty(4), np.empty(TOLD), np.empty(axes), np.empty(axes), later,
         np.empty(axes), np.empty((2, axes)), np.empty(efforts.shape[1]), np.empty(state),
@@ -242,17 +243,18 @@ def report(
         begin: Its first row among all axes.
         whole: Whether the margin is wanted that its blocks would report.
     """
-    end, last = begin + robot.size // 2 - 2, cell + 1 == cells.rows.shape[0]
-    following = cell if last else cell + 1
+    end, following = begin + robot.size // 2 - 2, cell + 1
+    if following == cells.rows.shape[0]:
+        return _report_arrival(k, sample, seen, robot, cells, nominal, memory, begin)
     own, after = cells.tables[cell, begin:end], cells.tables[following, begin:end]
-    margin = axes_ready(own, after, last, time, seen, robot)
+    margin = axes_ready(own, after, False, time, seen, robot)
     if margin < 0.0 and not whole:  # the position is not judged in vain
         return margin
     edges = cells.governed[cells.first[0, following] : cells.first[0, following + 1]]
-    stiffness, inradius, tolerance = cells.numbers[following, 1], cells.numbers[cell, 0], cells.tolerances[0]
+    stiffness, inradius = cells.numbers[following, 1], cells.numbers[cell, 0]
     if not nominal.flow.size:
         return robot_ready(
-            own, after, edges, stiffness, inradius, cells.goal, tolerance, last, time, seen, robot,
+            own, after, edges, stiffness, inradius, cells.goal, cells.tolerance, False, time, seen, robot,
             memory.governors[k],
         )  # fmt: skip
     shown, state = np.empty(6), memory.nominal[sample % memory.nominal.shape[0]]
@@ -261,8 +263,8 @@ def report(
     period, target = departures.times[0], cells.numbers[cell, 3:]
     show_nominal(here, cells.numbers[cell, 1], target, period, periods, speed, state, shown)
     return robot_ready_along(
-        own, after, edges, stiffness, inradius, cells.goal, tolerance, last, time, seen, robot, state[4:6],
-        shown,
+        own, after, edges, stiffness, inradius, cells.goal, cells.tolerance, False, time, seen, robot,
+        state[4:6], shown,
     )  # fmt: skip
 
 
@@ -306,6 +308,23 @@ def judge(
     alarms[0], alarms[1], alarms[2] = alarm_at(share, now, alarms[3]), share, which
     if share > 1.0:
         alarms[3] = now
+
+
+@compiled
+def _report_arrival(
+    k: int, sample: int, seen: FloatArray, robot: FloatArray, cells: LoopCells, nominal: LoopNominal,
+    memory: LoopMemory, begin: int,
+) -> float:  # fmt: skip
+    """Return the margin with which robot k has arrived, in the last cell; arguments as in ``report``."""
+    axes, rows = robot.size // 2 - 2, memory.recent.shape[0]
+    own, first = 2 * k + begin, k + begin
+    arrival = arrival_margin(
+        cells.places[own : own + 2 + axes], cells.rooms[0, first : first + 1 + axes],
+        cells.rooms[1, first : first + 1 + axes], memory.recent[:, own : own + 2 + axes], (sample - 1) % rows,
+    )  # fmt: skip
+    led = memory.nominal[sample % memory.nominal.shape[0], : 4 if nominal.flow.size else 0]
+    table, axes_led = cells.tables[-1, begin : begin + axes], nominal.axis_gains.size > 0
+    return robot_arrived(table, cells.goal, cells.tolerance, axes_led, seen, robot, led, arrival)
 
 
 @compiled

@@ -12,6 +12,7 @@ from coop_drake.compiled_loop.preparing import CompiledTransport
 from coop_drake.compiled_loop.watching import (
     ALARM,
     ARRIVED,
+    ASTRAY,
     AT_BODY,
     AT_WALL,
     BODY,
@@ -148,6 +149,7 @@ def _reason(transport: CompiledTransport, figures: FloatArray, axes: tuple[str, 
         return f"at t = {time:.6g} s in cell {cell}: {said}, as {robot} measures it"
     axis = axes[int(figures[PLACE])]
     text = {
+        ASTRAY: f"the team says that it has arrived, {value:.3g} times the tolerance away from the goal",
         STALLED: f"stalled, {value:.6g} s after its entry",
         LATE: "no arrival within max_time",
         OUT_OF_FUNNEL: f"distance of {axis} to its funnel is {value:.3g} rad or m",

@@ -19,8 +19,7 @@ from coop_drake.compiled_loop.clearances import (
 )
 from coop_drake.compiled_loop.robots import heard_cell
 from coop_drake.geometry.boundary import signed_distance
-from coop_drake.laws.axis_table import GOAL_LOWER, GOAL_UPPER, bounds_of
-from coop_drake.laws.readiness import interval_margin, position_arrival
+from coop_drake.laws.axis_table import bounds_of
 from coop_drake.systems.team_kernels import FusedTeam
 from coop_drake.tree.pose import FloatArray
 
@@ -49,7 +48,19 @@ to walls and to each other, the largest share of the budget, largest force and j
 samples, the value and the cell at the end, the robot that ended it, and the largest measured departure over
 its level."""
 
-RUNS, ARRIVED, STALLED, LATE, OUT_OF_FUNNEL, OUT_OF_SLICE, OUT_OF_REGION, AT_WALL, AT_BODY, HELD = range(10)
+(
+    RUNS,
+    ARRIVED,
+    ASTRAY,
+    STALLED,
+    LATE,
+    OUT_OF_FUNNEL,
+    OUT_OF_SLICE,
+    OUT_OF_REGION,
+    AT_WALL,
+    AT_BODY,
+    HELD,
+) = range(11)
 """How a run may have ended."""
 
 
@@ -124,8 +135,9 @@ def watch(
         _use(hypot(z[0] - led[0], z[1] - led[1]) / nominal.position[2], figures)
     _watch_efforts(team, memory, figures)
     _watch_alarms(nominal, memory, figures)
-    if cell + 1 == cells.rows.shape[0] and left_by_all(cell, memory) and _at_goal(cell, z, cells, plant):
-        end(figures, ARRIVED, 0.0)
+    if cell + 1 == cells.rows.shape[0] and left_by_all(cell, memory):
+        away = _share_of_tolerance(z, cells, team)
+        end(figures, ARRIVED if away <= 1.0 else ASTRAY, away)
     elif time > cells.numbers[cell, 2]:
         end(figures, STALLED, time)
     elif sample * departures.times[0] >= departures.times[1]:
@@ -230,11 +242,15 @@ def left_by_all(cell: int, memory: LoopMemory) -> bool:
 
 
 @compiled
-def _at_goal(cell: int, z: FloatArray, cells: LoopCells, plant: LoopPlant) -> bool:
-    """Whether the object and the joints are where the plan ends, whatever was measured."""
-    for i in range(z.size - 2):
-        row = cells.tables[cell, plant.axis_rows[0, i]]
-        if not interval_margin(z[2 + i], row[GOAL_LOWER], row[GOAL_UPPER]) >= 0.0:
-            return False
-    away = hypot(z[0] - cells.goal[0], z[1] - cells.goal[1])
-    return bool(position_arrival(away, 0.0, cells.tolerances[1]) >= 0.0)
+def _share_of_tolerance(z: FloatArray, cells: LoopCells, team: FusedTeam) -> float:
+    """Return how far object and joints are off the goal over what is tolerated, whatever was measured [-]."""
+    largest = 0.0
+    for k in range(team.yaws.size):
+        own, first = 3 * k + team.first[2, k], 2 * k + team.first[2, k]
+        place, room = cells.places[own:], cells.rooms[0, first:]
+        largest = max(
+            largest, hypot(z[0] - place[0], z[1] - place[1]) / room[0], abs(z[2] - place[2]) / room[1]
+        )
+        for i in range(team.first[2, k + 1] - team.first[2, k]):
+            largest = max(largest, abs(z[3 + team.first[2, k] + i] - place[3 + i]) / room[2 + i])
+    return largest

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import inf
+from math import inf, pi
 
 import numpy as np
 
@@ -12,13 +12,13 @@ from coop_drake.diagram.robot_controller import RobotKnowledge
 from coop_drake.errors import PlanError, ScenarioError
 from coop_drake.fields import HarmonicMap, VelocityField
 from coop_drake.geometry.boundary import BoundaryDistance
+from coop_drake.laws.arrival import ArrivalGoal
 from coop_drake.laws.disturbance import observer_gains
 from coop_drake.laws.governor import FIELD_SPEED, slowdown_radius
-from coop_drake.laws.readiness import REST_WINDOW
 from coop_drake.laws.sampling import whole_periods
 from coop_drake.plant import RobotPlant, TeamPlant, base_chain, build_robot_plant, robot_chain
 from coop_drake.plant.team import RobotModel
-from coop_drake.scenario import Deployment, Hold, Scenario
+from coop_drake.scenario import Hold, Scenario
 from coop_drake.systems import AxisMotion, GovernedCell, MonitoredRobot, NominalMotion
 
 REPORT_PERIODS = 2
@@ -69,7 +69,7 @@ def robot_knowledge(
             sample_offset=deployment.of_robot(robot.name).sample_offset,
             predicted_periods=delay if control.predictor else 0,
             hold=hold,
-            rest_samples=rest_samples(deployment),
+            goal=arrival_goal(scenario, plan, robot.q_slice),
             observer_gains=observer_gains(scenario.command_age) if control.observer else None,
             motion=_motion(scenario, plan, robot.name, 0 if control.predictor else delay),
             axis_motion=_axis_motion(scenario, plan, team, robot, 0 if control.predictor else delay),
@@ -84,10 +84,32 @@ def hold_of(scenario: Scenario, plan: Plan) -> Hold | None:
     return scenario.control.hold or (None if plan.alarms is None else Hold())
 
 
-def rest_samples(deployment: Deployment) -> int:
-    """Return over how many samples rates are averaged, 0 where they have no noise."""
-    noisy = deployment.period is not None and deployment.measurements.rate_noise > 0.0
-    return whole_periods(REST_WINDOW, deployment.period) if noisy and deployment.period else 0
+def arrival_goal(scenario: Scenario, plan: Plan, joints: slice) -> ArrivalGoal:
+    """Return the goal as a robot compares it with the means of what it measures.
+
+    Args:
+        scenario: The scenario.
+        plan: The plan, along which angles are unwrapped.
+        joints: Where the robot's joints stand in q.
+    """
+    allowed, budget, last = scenario.goal.tolerances, plan.budget, plan.transitions[-1]
+    middles = 0.5 * (last.goal_lower + last.goal_upper)
+    wanted = [plan.goal_pose[2], *plan.goal_joints[joints]]
+    at = [middles[0], *middles[1:][joints]]
+    turned = [
+        middle if goal is None else goal + 2.0 * pi * round((middle - goal) / (2.0 * pi))
+        for goal, middle in zip(wanted, at, strict=True)
+    ]
+    rooms = [
+        allowed.position,
+        allowed.angle,
+        *(inf if goal is None else allowed.joint for goal in wanted[1:]),
+    ]
+    errors = np.zeros(len(rooms))
+    if budget is not None:
+        errors[:] = budget.angle_noise
+        errors[:2] = budget.single_noise * np.array([budget.position_noise, budget.angle_noise])
+    return ArrivalGoal(np.array([*plan.goal_pose[:2], *turned]), np.array(rooms), errors)
 
 
 def report_periods(age: float, period: float) -> int:

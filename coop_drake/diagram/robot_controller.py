@@ -10,9 +10,11 @@ from pydrake.systems.framework import Diagram, DiagramBuilder, LeafSystem, Outpu
 from pydrake.systems.primitives import Demultiplexer, DiscreteTimeIntegrator, Integrator, ZeroOrderHold
 
 from coop_drake.answers.plan import Plan
+from coop_drake.laws.arrival import ArrivalGoal
 from coop_drake.plant import ObjectInertia, RobotPlant
 from coop_drake.scenario import Hold
 from coop_drake.systems import (
+    ArrivalMonitor,
     AxisLaw,
     AxisMotion,
     AxisPpc,
@@ -68,7 +70,7 @@ class RobotKnowledge:
         predicted_periods: Age of its measurements that it predicts over, in control periods; 0 for none.
         hold: When the team is held, None for never.
         observer_gains: Gain and leak of its disturbance observer [1/s]; None for no observer.
-        rest_samples: Number of samples over which rates are averaged in the last cell, 0 for none.
+        goal: What it compares the means of what it measures with, where it is sampled.
         motion: The nominal motion of the position; None where p_G follows the measured position.
         axis_motion: That of the object's angle and of its joints; None where their law acts on what is
             measured.
@@ -83,12 +85,12 @@ class RobotKnowledge:
     plan: Plan
     cells: Sequence[GovernedCell]
     position_tolerance: float
+    goal: ArrivalGoal
     period: float | None = None
     sample_offset: float = 0.0
     predicted_periods: int = 0
     observer_gains: tuple[float, float] | None = None
     hold: Hold | None = None
-    rest_samples: int = 0
     motion: NominalMotion | None = None
     axis_motion: AxisMotion | None = None
     monitored: MonitoredRobot | None = None
@@ -192,9 +194,8 @@ def _blocks(knowledge: RobotKnowledge) -> dict[str, LeafSystem]:
             plan.goal_pose[:2],
             knowledge.position_tolerance,
             nominal=knowledge.motion is not None,
-            averaged=knowledge.rest_samples,
-            period=knowledge.period,
-            offset=knowledge.sample_offset,
+            measured=knowledge.period is not None,
+            axes_led=knowledge.axis_motion is not None,
         ),
         **_additions(knowledge, laws),
     }
@@ -208,8 +209,12 @@ def _governor(knowledge: RobotKnowledge, *, paced: bool) -> dict[str, LeafSystem
 
 
 def _additions(knowledge: RobotKnowledge, laws: Sequence[AxisLaw]) -> dict[str, LeafSystem]:
-    """Return the blocks that a scenario's section ``control`` adds."""
+    """Return the blocks that sampling, a budget and a scenario's section ``control`` add."""
     added: dict[str, LeafSystem] = {}
+    if knowledge.period is not None:
+        added["arrival_monitor"] = ArrivalMonitor(
+            knowledge.goal, len(knowledge.cells), knowledge.period, knowledge.sample_offset
+        )
     if knowledge.predicted_periods and knowledge.period is not None:
         added["state_predictor"] = StatePredictor(
             knowledge.robot,
@@ -276,7 +281,7 @@ _FOLLOWERS = ("axis_ppc", "ready_monitor")
 _AHEAD = {"object_state": "object_ahead", "robot_state": "robot_ahead"}
 """Which signals the blocks that command get then: measured angles and rates would be late and noisy."""
 
-_RAW = ("state_predictor", "departure_monitor")
+_RAW = ("state_predictor", "departure_monitor", "arrival_monitor")
 """Blocks that get what was measured where others get a prediction."""
 
 _COMPENSATED = ("wrench_law", "robot_effort")

@@ -14,7 +14,7 @@ is larger where the object moves to and fro. What all samples have in common, as
 
 from __future__ import annotations
 
-from math import hypot, inf, isnan, sqrt
+from math import hypot, inf, isfinite, sqrt
 from typing import NamedTuple
 
 from coop_drake.compiled import compiled
@@ -71,22 +71,23 @@ def arrival_margin(
         place: This and the next two arguments are the fields of an ``ArrivalGoal``; see there.
         tolerances: The tolerances.
         errors: The certified errors.
-        recent: (x, y, theta, own joints) as measured at the last 2 W samples, NaN where there were fewer,
-            shape (2 W, 3 + n) [m, rad].
+        recent: (x, y, theta, own joints) as measured at the last 2 W samples, infinite where there were
+            fewer, shape (2 W, 3 + n) [m, rad].
         newest: The row of the newest ones; the older ones stand before it, the last row before the first.
     """
     margin = 1.0
     x, y = _statistics(recent, newest, 0), _statistics(recent, newest, 1)
     for i in range(tolerances.size):
         if i == 0:
-            away, moved = hypot(x[0] - place[0], y[0] - place[1]), hypot(x[0] - x[1], y[0] - y[1])
+            away, before = hypot(x[0] - place[0], y[0] - place[1]), x[1]
+            moved = hypot(x[0] - x[1], y[0] - y[1])
             scatter, steps = 0.5 * (x[2] + y[2]), 0.5 * (x[3] + y[3])
             rest, deviations = MEAN_TIME * SPEED_TOLERANCE, PLANE_DEVIATIONS
         else:
             mean, before, scatter, steps = _statistics(recent, newest, 2 + i - 1)
             away, moved = abs(mean - place[1 + i]), abs(mean - before)
             rest, deviations = MEAN_TIME * RATE_TOLERANCE, DEVIATIONS
-        if isnan(moved):
+        if not isfinite(before):
             return FAR
         noise, still = deviations * sqrt(2.0 * scatter / recent.shape[0]), rest + errors[i]
         margin = min(margin, 1.0 - moved / (rest + 2.0 * (errors[i] + noise)))

@@ -23,7 +23,6 @@ __all__ = [
     "CLEARANCE_FRACTION",
     "EROSION",
     "RATE_TOLERANCE",
-    "REST_WINDOW",
     "SPEED_TOLERANCE",
     "axis_arrival",
     "axis_ready",
@@ -48,11 +47,6 @@ SPEED_TOLERANCE = 0.01
 RATE_TOLERANCE = 0.02
 """Largest rate of an axis that counts as rest [rad/s or m/s]: at half a metre the speed of
 ``SPEED_TOLERANCE``."""
-
-REST_WINDOW = 0.1
-"""Time over which robots average noisy rates to judge whether the motion has ended [s]: long against
-a control period, so that noise averages out. The mean is what was moved meanwhile over this time, at most
-1 mm and 2 mrad."""
 
 
 @compiled

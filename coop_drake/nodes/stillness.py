@@ -6,20 +6,21 @@ from collections import deque
 
 import numpy as np
 
-from coop_drake.laws.readiness import RATE_TOLERANCE, REST_WINDOW
+from coop_drake.laws.arrival import MEAN_TIME
+from coop_drake.laws.readiness import RATE_TOLERANCE
 from coop_drake.laws.sampling import whole_periods
 from coop_drake.tree.pose import FloatArray
 
 
 class Stillness:
-    """Keeps the last samples over ``REST_WINDOW``.
+    """Keeps the last samples over ``MEAN_TIME``.
 
     Args:
         period: Time between two samples [s].
     """
 
     def __init__(self, period: float) -> None:
-        self._samples: deque[FloatArray] = deque(maxlen=whole_periods(REST_WINDOW, period))
+        self._samples: deque[FloatArray] = deque(maxlen=whole_periods(MEAN_TIME, period))
 
     def restart(self) -> None:
         """Forget all samples."""

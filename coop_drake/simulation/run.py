@@ -13,6 +13,7 @@ from coop_drake.answers.log import SimulationLog
 from coop_drake.answers.plan import Plan
 from coop_drake.answers.plan_file import plan_digest
 from coop_drake.diagram import Replacements, build_closed_loop
+from coop_drake.diagram.knowledge import arrival_goal
 from coop_drake.fields import HarmonicMap
 from coop_drake.plant import read_component_tree
 from coop_drake.plant.scenario_digest import scenario_digest
@@ -93,7 +94,7 @@ def run_loop(
     watch = Watch(
         loop,
         Invariants(clearance, plan, exact=scenario.ideal),
-        scenario.goal.tolerances.position,
+        arrival_goal(scenario, plan, slice(None)),
         root,
         progress,
         observer,

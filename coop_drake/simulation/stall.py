@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from math import inf
+
 import numpy as np
 
 from coop_drake.answers.plan import Plan
 from coop_drake.geometry.boundary import BoundaryDistance
+from coop_drake.laws.arrival import ArrivalGoal
 from coop_drake.laws.axis_table import ENERGY_BOUND, REST_RATE, axis_table, track_row
 from coop_drake.laws.hand_over import governed_gains
 from coop_drake.laws.readiness import (
+    EROSION,
     axis_ready,
     clearance_margin,
     funnel_margin,
@@ -19,6 +23,7 @@ from coop_drake.laws.readiness import (
 from coop_drake.simulation.telemetry import Sample
 from coop_drake.systems.governor_kernels import cell_margin
 from coop_drake.systems.hold_supervisor import ASKED, BRAKED, SILENT, TOLD
+from coop_drake.tree.pose import FloatArray
 
 PATIENCE_FACTOR = 10.0
 """A transition may take this many times its estimated time [-]: estimates are within a factor of two."""
@@ -32,18 +37,21 @@ def patience(plan: Plan, cell: int) -> float:
     return PATIENCE_FACTOR * plan.transitions[cell].estimated_time + PATIENCE_ALLOWANCE
 
 
-def blocking_margin(plan: Plan, sample: Sample, position_tolerance: float) -> str:
+def blocking_margin(plan: Plan, sample: Sample, goal: ArrivalGoal) -> str:
     """Return the condition that is furthest from being met in the current cell, as a phrase with its margin.
 
     Args:
         plan: The plan.
         sample: The present instant.
-        position_tolerance: How close to the goal counts as arrived [m].
+        goal: The goal of the whole team; the tolerances count, no errors.
     """
     if sample.held:
         return f"the hold ends: {_causes_of(sample)}"
     last = sample.cell == len(plan.cells) - 1
-    margins = _arrival(plan, sample, position_tolerance) if last else _readiness(plan, sample)
+    margins = _arrival(plan, sample, goal) if last else _readiness(plan, sample)
+    if last and min(margins.values()) >= 0.0 > min(sample.ready_margins):
+        k = int(np.argmin(sample.ready_margins))
+        return f"robot {k} measures that the goal is reached (margin {sample.ready_margins[k]:.3g})"
     if min(margins.values()) >= 0.0:
         return "the cell planner receives the robots' reports; all robots are ready"
     name = min(margins, key=lambda key: margins[key])
@@ -114,28 +122,28 @@ def _readiness(plan: Plan, sample: Sample) -> dict[str, float]:
     return margins
 
 
-def at_goal(plan: Plan, sample: Sample, position_tolerance: float) -> bool:
-    """Whether the object and the joints are where the plan ends, whatever the robots have measured.
+def off_goal(goal: ArrivalGoal, z: FloatArray) -> float:
+    """Return how far object and joints are from the goal, over what is tolerated, whatever was measured.
 
     Args:
-        plan: The plan.
-        sample: The present instant, in the last cell.
-        position_tolerance: How close to the goal counts as arrived [m].
+        goal: That of the whole team.
+        z: Where they are, shape (3 + n,) [m, rad].
     """
-    return min(_places(plan, sample, position_tolerance).values()) >= 0.0
+    away = np.abs(z - goal.place)
+    return float(max(np.hypot(*away[:2]) / goal.tolerances[0], *(away[2:] / goal.tolerances[1:])))
 
 
-def _places(plan: Plan, sample: Sample, position_tolerance: float) -> dict[str, float]:
-    margins = _intervals(plan, sample)
-    distance = float(np.hypot(*(sample.z[:2] - plan.goal_pose[:2])))
-    margins["the object reaches its goal position"] = position_arrival(distance, 0.0, position_tolerance)
-    return margins
-
-
-def _arrival(plan: Plan, sample: Sample, position_tolerance: float) -> dict[str, float]:
-    margins = _places(plan, sample, position_tolerance)
+def _arrival(plan: Plan, sample: Sample, goal: ArrivalGoal) -> dict[str, float]:
+    tolerance, axes = float(goal.tolerances[0]), zip(_axes(plan), sample.z[2:], goal.place[2:], strict=True)
+    margins = {
+        f"{name} reaches its goal": 1.0 - abs(position - place) / ((1.0 - EROSION) * room)
+        for (name, position, place), room in zip(axes, goal.tolerances[1:], strict=True)
+        if room < inf
+    }
+    distance = float(np.hypot(*(sample.z[:2] - goal.place[:2])))
+    margins["the object reaches its goal position"] = position_arrival(distance, 0.0, tolerance)
     speed = float(np.hypot(*sample.rates[:2]))
     margins["the object and the joints come to rest"] = min(
-        position_arrival(0.0, speed, position_tolerance), rest_margin(float(np.abs(sample.rates[2:]).max()))
+        position_arrival(0.0, speed, tolerance), rest_margin(float(np.abs(sample.rates[2:]).max()))
     )
     return margins

@@ -9,6 +9,7 @@ from pydrake.systems.framework import Context, EventStatus
 
 from coop_drake.answers.plan import Plan
 from coop_drake.diagram import World
+from coop_drake.laws.arrival import ArrivalGoal
 from coop_drake.laws.departure import departing_name
 from coop_drake.plant import TeamPlant
 from coop_drake.simulation.invariants import Invariants, Margins
@@ -16,9 +17,9 @@ from coop_drake.simulation.logged_ports import LoggedLoop, ReportingLoop
 from coop_drake.simulation.recorder import Recorder
 from coop_drake.simulation.stall import (
     PATIENCE_ALLOWANCE,
-    at_goal,
     blocking_margin,
     narrowest_funnel,
+    off_goal,
     patience,
 )
 from coop_drake.simulation.telemetry import Sample, Telemetry
@@ -31,7 +32,7 @@ class Watch:
     Args:
         loop: The closed loop that runs.
         invariants: What must hold.
-        position_tolerance: How close to the goal counts as arrived [m].
+        goal: The goal of the whole team; the tolerances count, no errors.
         root: Context of the whole diagram in the simulator.
         progress: Called with the stage and the fraction done, if given.
         observer: Called with every accepted step, if given.
@@ -41,7 +42,7 @@ class Watch:
         self,
         loop: LoggedLoop,
         invariants: Invariants,
-        position_tolerance: float,
+        goal: ArrivalGoal,
         root: Context,
         progress: Callable[[str, float], None] | None,
         observer: Callable[[Sample], None] | None = None,
@@ -52,7 +53,7 @@ class Watch:
         self._loop, self._invariants = loop, invariants
         self._progress, self._observer = progress, observer
         self._telemetry = Telemetry(loop, root)
-        self._tolerance = position_tolerance
+        self._goal = goal
         self._last: Sample | None = None
         self._returns = False
         self._asked_since: float | None = None
@@ -77,8 +78,8 @@ class Watch:
             self.violation = margins.violation
         elif (asking := self._beyond_holding(sample)) is not None:
             self.violation = f"at t = {sample.time:.6g} s in cell {sample.cell}: {asking}"
-        elif sample.arrived and at_goal(self._loop.plan, sample, self._tolerance):
-            self.reached = True
+        elif sample.arrived:
+            self._see_arrival(sample)
         elif sample.time - sample.entry - sample.clock_lag > patience(self._loop.plan, sample.cell):
             self.give_up("stalled")
         if not self.ended:
@@ -108,6 +109,17 @@ class Watch:
             return f"{_names(team, asking)} {long}{_departing(team, plan, sample)}"
         return None
 
+    def _see_arrival(self, sample: Sample) -> None:
+        """End the run of a team that says that it has arrived: whether that is so, the world's poses tell."""
+        away = off_goal(self._goal, sample.z)
+        self.reached = away <= 1.0
+        if not self.reached:
+            x, y, angle = sample.z[:3] - self._goal.place[:3]
+            self.violation = (
+                f"at t = {sample.time:.6g} s the team says that it has arrived, but is {away:.3g} times the "
+                f"tolerance off the goal: the object by {np.hypot(x, y):.3g} m and {abs(angle):.3g} rad"
+            )
+
     def _see_stop(self, sample: Sample, margins: Margins, trouble: str) -> None:
         """Watch a team whose drives brake for contacts, until it begins its cell anew or cannot go on."""
         self._returns = True
@@ -128,7 +140,7 @@ class Watch:
         Args:
             why: What happened, for example ``stalled``.
         """
-        self._end(why, lambda plan, last: f"it waits until {blocking_margin(plan, last, self._tolerance)}")
+        self._end(why, lambda plan, last: f"it waits until {blocking_margin(plan, last, self._goal)}")
 
     def fail(self, why: str) -> None:
         """End a run that cannot be integrated further; the message names the axis nearest to a bound."""

@@ -1,5 +1,6 @@
 """Thin LeafSystems over the control laws, the velocity fields and the cell planner."""
 
+from coop_drake.systems.arrival_monitor import ArrivalMonitor
 from coop_drake.systems.axis_laws import AxisLaw, axis_laws
 from coop_drake.systems.axis_ppc import AxisPpc
 from coop_drake.systems.block import Block
@@ -39,6 +40,7 @@ __all__ = [
     "CURRENT_CELL_SIZE",
     "READY_SIZE",
     "REQUEST_SIZE",
+    "ArrivalMonitor",
     "AxisLaw",
     "AxisMotion",
     "AxisPpc",

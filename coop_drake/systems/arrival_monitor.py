@@ -23,7 +23,7 @@ class ArrivalMonitor(Block):
     ======= ================ ========== ======================================================== =====
 
     State: one discrete group, updated every ``period`` in the last cell: the pose and the joints of the last
-    2 W samples there, the oldest ones first; NaN before there are so many.
+    2 W samples there, the oldest ones first; infinite before there are so many.
 
     Args:
         goal: What they are compared with.
@@ -39,7 +39,7 @@ class ArrivalMonitor(Block):
         self._state = self.DeclareVectorInputPort("robot_state", 2 * goal.place.size)
         self._pose = self.DeclareVectorInputPort("object_pose", 3)
         self._cell = self.DeclareVectorInputPort("current_cell", CURRENT_CELL_SIZE)
-        group = self.DeclareDiscreteState(np.full(self._shape[0] * self._shape[1], np.nan))
+        group = self.DeclareDiscreteState(np.full(self._shape[0] * self._shape[1], np.inf))
         read = {self.discrete_state_ticket(group), self.input_port_ticket(self._cell.get_index())}
         self.DeclareVectorOutputPort("arrival", 1, self._write_arrival, read)
         self.declare_update(self._remember, period, offset)

@@ -21,7 +21,7 @@ from coop_drake.systems.governor_kernels import cell_margin
 from coop_drake.systems.nominal_kernels import nominal_ready
 from coop_drake.tree.pose import FloatArray
 
-__all__ = ["ReadyConditions", "ready_conditions", "robot_ready", "robot_ready_along"]
+__all__ = ["ReadyConditions", "ready_conditions", "robot_arrived", "robot_ready", "robot_ready_along"]
 
 
 class ReadyConditions(NamedTuple):
@@ -140,21 +140,49 @@ def robot_ready_along(
         next_edges: Edges of the next governed set.
         next_stiffness: K with which it is entered.
         inradius: R of the transition; not used here.
-        goal: Goal position.
-        tolerance: Tolerance of the nominal position.
-        last: Whether this is the last cell.
+        goal: Goal position; not used here.
+        tolerance: Tolerance of the nominal position; not used here.
+        last: Whether this is the last cell; it is not, see ``robot_arrived``.
         time: Time since the current cell was entered [s].
         object_state: Pose and twist of the object.
         robot: The robot's own state.
         governor_position: p_G.
         nominal: What ``show_nominal`` writes, shape (6,).
     """
-    if last:
-        distance = np.hypot(nominal[0] - goal[0], nominal[1] - goal[1])
-        margin = position_arrival(distance, np.hypot(nominal[2], nominal[3]), tolerance)
-    else:
-        margin = nominal_ready(next_edges, next_stiffness, nominal, governor_position)
+    margin = nominal_ready(next_edges, next_stiffness, nominal, governor_position)
     return min(margin, axes_ready(table, next_table, last, time, object_state, robot))
+
+
+@compiled
+def robot_arrived(
+    table: FloatArray, goal: FloatArray, tolerance: float, axes_led: bool, object_state: FloatArray,
+    robot: FloatArray, nominal: FloatArray, arrival: float,
+) -> float:  # fmt: skip
+    """Return the margin with which a sampled robot has arrived in the last cell, arrived if not negative.
+
+    It measures that it has, and where nominal motions lead, they are at rest at the goal, too.
+
+    Args:
+        table: The axes (theta, own joints) in this cell.
+        goal: Goal position, shape (2,) [m].
+        tolerance: Tolerance of the nominal position [m].
+        axes_led: Whether ``object_state`` and ``robot`` have the angles and rates of nominal axes.
+        object_state: Pose and twist of the object, shape (6,).
+        robot: The robot's own state.
+        nominal: What ``show_nominal`` writes, shape (6,), or shape (0,) where no nominal motion leads.
+        arrival: What ``arrival_margin`` gives.
+    """
+    margin, n = arrival, table.shape[0] - 1
+    if nominal.size:
+        distance = np.hypot(nominal[0] - goal[0], nominal[1] - goal[1])
+        margin = min(margin, position_arrival(distance, np.hypot(nominal[2], nominal[3]), tolerance))
+    if axes_led:
+        for i in range(1 + n):
+            position, rate = object_state[2], object_state[5]
+            if i > 0:
+                position, rate = robot[2 + i], robot[5 + n + i]
+            margin = min(margin, axis_arrival(table[i], position, rate))
+    return margin
 
 
 @compiled

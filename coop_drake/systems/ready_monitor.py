@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import numpy as np
-from pydrake.systems.framework import BasicVector, Context, DiscreteValues, EventStatus
+from pydrake.systems.framework import BasicVector, Context
 
 from coop_drake.compiled import prepared
 from coop_drake.laws.departure import quiet_margin
@@ -13,13 +12,10 @@ from coop_drake.systems.axis_laws import AxisLaw
 from coop_drake.systems.block import NUMBER, VECTOR, Block
 from coop_drake.systems.current_cell import CURRENT_CELL_SIZE, READY_SIZE, index_of
 from coop_drake.systems.departure_monitor import ALARM_SIZE
-from coop_drake.systems.nominal_kernels import NOMINAL_SIZE
-from coop_drake.systems.ready_kernels import ready_conditions, robot_ready, robot_ready_along
+from coop_drake.systems.nominal_kernels import NOMINAL_SIZE, NOTHING
+from coop_drake.systems.ready_kernels import ready_conditions, robot_arrived, robot_ready, robot_ready_along
 from coop_drake.systems.reference_governor import GovernedCell
 from coop_drake.tree.pose import FloatArray
-
-MOVING = 1.0
-"""Rate that counts where there are no samples yet, far beyond what counts as rest [m/s, rad/s]."""
 
 
 class ReadyMonitor(Block):
@@ -32,14 +28,14 @@ class ReadyMonitor(Block):
     input   ``current_cell``       2          index of the current cell, time of its entry [-, s]
     input   ``nominal``            6          what ``NominalGovernor`` shows; only with ``nominal``
     input   ``alarm``              3          what ``DepartureMonitor`` says; only with ``nominal``
+    input   ``arrival``            1          what ``ArrivalMonitor`` shows; only with ``measured``
     output  ``ready``              2          index of the current cell, signed margin [-]
     ======= ====================== ========== ====================================================== =====
 
     The report is all that a robot sends to others: whether it is ready, and for which cell. With ``nominal``
     a robot is ready where its nominal motion may enter the next cell and its monitor is quiet.
 
-    No state, unless rates are averaged: then one discrete group, updated every ``period`` in the last cell,
-    the rates of the last samples, which count as ``MOVING`` before there are so many.
+    No state.
 
     Args:
         cells: Governor's data of every cell.
@@ -48,9 +44,8 @@ class ReadyMonitor(Block):
         goal_position: Where the object shall end, shape (2,) [m].
         position_tolerance: How close to it counts as arrived [m].
         nominal: Whether the position is judged by its nominal motion.
-        averaged: Number of samples over which rates are averaged in the last cell, 0 for none.
-        period: Time between samples [s]; needed where rates are averaged.
-        offset: Time of the first sample [s].
+        measured: Whether the robot is sampled: it judges its arrival by the means of what it measures.
+        axes_led: Whether angles and joints in the inputs are those of their nominal motions.
 
     Raises:
         ValueError: The sequences are empty or differ in length, or the tolerance is not positive.
@@ -65,9 +60,8 @@ class ReadyMonitor(Block):
         position_tolerance: float,
         nominal: bool = False,
         *,
-        averaged: int = 0,
-        period: float | None = None,
-        offset: float = 0.0,
+        measured: bool = False,
+        axes_led: bool = False,
     ) -> None:
         super().__init__()
         if not cells or not len(cells) == len(laws) == len(inradii):
@@ -94,40 +88,24 @@ class ReadyMonitor(Block):
         self._current = self.DeclareVectorInputPort("current_cell", CURRENT_CELL_SIZE)
         self._nominal = self.DeclareVectorInputPort("nominal", NOMINAL_SIZE) if nominal else None
         self._alarm = self.DeclareVectorInputPort("alarm", ALARM_SIZE) if nominal else None
-        self._averaged = averaged
-        if averaged:
-            self.DeclareDiscreteState(np.full(averaged * (3 + n), MOVING))
-            self.declare_update(self._remember, period, offset)
+        self._arrival = self.DeclareVectorInputPort("arrival", 1) if measured else None
+        last = conditions[-1]
+        known = last.table, last.goal, last.tolerance, axes_led
+        self._arrived = prepared(robot_arrived, known, VECTOR, VECTOR, VECTOR, NUMBER)
         self.DeclareVectorOutputPort("ready", READY_SIZE, self._write_ready)
-
-    def _remember(self, context: Context, discrete_state: DiscreteValues) -> EventStatus:
-        if index_of(self._current.Eval(context), len(self._ready)) + 1 < len(self._ready):
-            return EventStatus.DidNothing()
-        state, rates = context.get_discrete_state_vector().value(), self._object.Eval(context)[3:]
-        joints = self._state.Eval(context)[len(self._state.Eval(context)) // 2 + 3 :]
-        kept = state[len(rates) + len(joints) :]
-        discrete_state.get_mutable_vector().SetFromVector(np.concatenate((kept, rates, joints)))
-        return EventStatus.Succeeded()
-
-    def _states(self, context: Context, index: int) -> tuple[FloatArray, FloatArray]:
-        """Return the states of object and robot, in the last cell with averaged rates."""
-        seen, robot = self._object.Eval(context), self._state.Eval(context)
-        if self._averaged and index + 1 == len(self._ready):
-            mean = context.get_discrete_state_vector().value().reshape(self._averaged, -1).mean(axis=0)
-            seen, robot = seen.copy(), robot.copy()
-            seen[3:], robot[len(robot) // 2 + 3 :] = mean[:3], mean[3:]
-        return seen, robot
 
     def _write_ready(self, context: Context, output: BasicVector) -> None:
         current, report = self._current.Eval(context), output.get_mutable_value()
         index = index_of(current, len(self._ready))
         report[0] = index
+        seen, robot = self._object.Eval(context), self._state.Eval(context)
         led = () if self._nominal is None else (self._nominal.Eval(context),)
-        report[1] = self._ready[index](
-            context.get_time() - current[1],
-            *self._states(context, index),
-            self._governor.Eval(context),
-            *led,
-        )
+        if self._arrival is not None and index + 1 == len(self._ready):
+            report[1] = self._arrived(
+                seen, robot, *(led or (NOTHING,)), float(self._arrival.Eval(context)[0])
+            )
+        else:
+            time, governor = context.get_time() - current[1], self._governor.Eval(context)
+            report[1] = self._ready[index](time, seen, robot, governor, *led)
         if self._alarm is not None:
             report[1] = quiet_margin(report[1], self._alarm.Eval(context)[0])

@@ -33,7 +33,7 @@ def test_at_rest_at_the_goal_it_has_arrived_wherever_the_ring_begins(turned):
 
 def test_it_measures_for_long_enough_first():
     samples = at(0.0, 0.0, 0.0, 0.0)
-    samples[0] = np.nan
+    samples[0] = np.inf
     assert margin(samples) == FAR
 
 

@@ -108,7 +108,15 @@ def test_only_switches_jumps_holds_what_is_predicted_and_what_models_failures_ar
     remembering = {name for name in BLOCKS if any(map(len, state_of(blocks[name][0].CreateDefaultContext())))}
     failures = {"Interruption", "LaggingEffort", "LossyMeasurement", "MessageChannel"}
     holds = {"FunnelClock", "HoldMonitor", "HoldReceiver", "HoldSupervisor"}
-    laws = {"CellPlanner", "AxisPpc", "TeamController", "StatePredictor", "NominalAxes", "NominalGovernor"}
+    laws = {
+        "CellPlanner",
+        "ArrivalMonitor",
+        "AxisPpc",
+        "TeamController",
+        "StatePredictor",
+        "NominalAxes",
+        "NominalGovernor",
+    }
     assert remembering == laws | holds | failures | {"TeamLink", "DepartureMonitor"}
 
 

@@ -1,13 +1,12 @@
 import numpy as np
 import pytest
-from pydrake.systems.analysis import Simulator
 
 from coop_drake.geometry.boundary import BoundaryDistance
 from coop_drake.systems import GovernedCell, ReadyMonitor, axis_laws
 from coop_drake.systems.ready_kernels import ready_conditions
 from tests.support.readiness import margin_of
 from tests.support.small_plan import GOAL_POSE, POSITION_TOLERANCE, small_plan, stiffer_and_stiffer
-from tests.support.system_checks import assert_every_input_is_required, context_with, evaluate, port_sizes
+from tests.support.system_checks import assert_every_input_is_required, evaluate, port_sizes
 
 PLAN = stiffer_and_stiffer(small_plan(("a", "b", "c")))
 AXES = [0, 2, 3]
@@ -114,30 +113,23 @@ def test_bad_parameters_are_refused(cells):
         ReadyMonitor(cells, laws, [0.1, 0.1, 0.1], goal, 0.0)
 
 
-def test_noisy_rates_are_averaged_in_the_last_cell_alone(cells):
-    """Rates of 0.018 rad/s with an error of 0.01 of changing sign count as at rest after a whole window."""
+@pytest.mark.parametrize("axes_led", [False, True])
+def test_in_the_last_cell_a_sampled_robot_says_what_it_measures_besides_what_leads_it(cells, axes_led):
     inradii = [transition.inradius for transition in PLAN.transitions]
     parts = cells, axis_laws(PLAN, AXES), inradii, PLAN.goal_pose[:2], POSITION_TOLERANCE
-    monitor, single = ReadyMonitor(*parts, averaged=4, period=0.01), ReadyMonitor(*parts)
-    last, middle = len(cells) - 1, 0.5 * (PLAN.transitions[-1].goal_lower + PLAN.transitions[-1].goal_upper)
+    sampled, last = ReadyMonitor(*parts, measured=True, axes_led=axes_led), len(cells) - 1
+    middle = 0.5 * (PLAN.transitions[-1].goal_lower + PLAN.transitions[-1].goal_upper)
     inputs = {
         **INPUTS,
         "object_state": [*PLAN.goal_pose[:2], middle[0], 0.0, 0.0, 0.0],
         "robot_state": [1.0, 2.0, 0.3, middle[2], middle[3], *[0.0] * 5],
         "current_cell": [last, 0.0],
+        "arrival": [0.4],
     }
-    simulator = Simulator(monitor, context_with(monitor, inputs))
-    context, margins = simulator.get_mutable_context(), []
-    for k in range(6):
-        rate = 0.018 + (-1.0) ** k * 0.01
-        noisy = {**inputs, "object_state": [*inputs["object_state"][:5], rate]}
-        for name, value in noisy.items():
-            monitor.GetInputPort(name).FixValue(context, value)
-        simulator.AdvanceTo(0.01 * k + 0.005)
-        margins.append(monitor.GetOutputPort("ready").Eval(context)[1])
-        assert (evaluate(single, noisy, "ready")[1] >= 0.0) == (k % 2 == 1)
-    assert margins[2] < 0.0
-    assert margins[3:] == pytest.approx([1.0 - 0.018 / 0.02] * 3)
-    monitor.GetInputPort("current_cell").FixValue(context, [0.0, 0.0])
-    own = evaluate(single, {**noisy, "current_cell": [0.0, 0.0]}, "ready")
-    np.testing.assert_array_equal(monitor.GetOutputPort("ready").Eval(context), own)
+    assert evaluate(sampled, inputs, "ready").tolist() == [last, 0.4]
+    assert evaluate(sampled, {**inputs, "arrival": [-1.0]}, "ready").tolist() == [last, -1.0]
+    moving = {**inputs, "object_state": [*inputs["object_state"][:5], 0.03]}
+    assert (evaluate(sampled, moving, "ready")[1] < 0.0) == axes_led  # else the rate is a noisy measurement
+    before = {**inputs, "current_cell": [0.0, 0.0], "arrival": [-1.0]}
+    expected = evaluate(ReadyMonitor(*parts), {name: before[name] for name in INPUTS}, "ready")
+    np.testing.assert_array_equal(evaluate(sampled, before, "ready"), expected)
