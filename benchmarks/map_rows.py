@@ -22,7 +22,7 @@ from coop_drake.fields import HarmonicMap, skeletons
 __all__ = ["ablation_rows", "cost_rows", "map_rows"]
 
 RESIDUAL = 1e-8
-"""Largest residual on the boundary that a map may have; the certified error is 2 M + 1 times that."""
+"""Largest residual on the boundary that a map may have; the estimated error is 2 M + 1 times that."""
 
 _POINTS = 1_000
 _QUICK = 0.3  # what takes no longer is timed several times [s]
@@ -78,9 +78,9 @@ def _measured(
     except FieldError:
         return [Row(f"{name}/answer", 0.0, "refused"), Row(f"{name}/vertices", domain.vertices, "-")], None
     first = process_time() - start
-    certificate = harmonic_map.certificate
+    accuracy = harmonic_map.accuracy
     again = _best(lambda: _mapped(domain)) if first < _SLOW else first
-    n = certificate.unknowns
+    n = accuracy.unknowns
     peer = f"dense solve, {n} unknowns" if n <= _MOST_UNKNOWNS else ""
     peer_map = "" if hntf2d_residual is None else "hntf2d (3200 elements), measured apart"
     return [
@@ -89,7 +89,7 @@ def _measured(
         Row(f"{name}/unknowns", n, "-"),
         Row(f"{name}/first_cpu_seconds", first, "s"),
         Row(f"{name}/cpu_seconds", again, "s", peer, _dense_seconds(n) if peer else None),
-        Row(f"{name}/residual", certificate.residual, "-", peer_map, hntf2d_residual),
+        Row(f"{name}/residual", accuracy.residual, "-", peer_map, hntf2d_residual),
     ], harmonic_map
 
 
@@ -98,7 +98,7 @@ def _evaluation_rows(name: str, harmonic_map: HarmonicMap) -> list[Row]:
     low, high = np.reshape(harmonic_map.region.bounds, (2, 2))
     points = np.random.default_rng(0).uniform(low, high, (20 * _POINTS, 2))
     points = points[shapely.contains_xy(harmonic_map.region, *points.T)][:_POINTS]
-    n = harmonic_map.certificate.unknowns
+    n = harmonic_map.accuracy.unknowns
     sources = np.exp(2j * np.pi * np.arange(n) / n)
     weights = np.column_stack((sources, 1j * sources))
 

@@ -70,11 +70,11 @@ def base_rows() -> list[Row]:
         _build(plan, store=MapStore(Path(folder)))
         kept, maps = _build(plan, store=MapStore(Path(folder)))
         size = MapStore(Path(folder)).size() / 1e6
-    certificates = [harmonic_map.certificate for harmonic_map in maps]
-    residual = max(certificate.residual for certificate in certificates)
+    accuracies = [harmonic_map.accuracy for harmonic_map in maps]
+    residual = max(accuracy.residual for accuracy in accuracies)
     return [
         Row("mapping/base/maps", len(maps), "-"),
-        Row("mapping/base/largest_unknowns", max(c.unknowns for c in certificates), "-"),
+        Row("mapping/base/largest_unknowns", max(c.unknowns for c in accuracies), "-"),
         Row("mapping/base/first_seconds", first, "s"),
         Row("mapping/base/seconds", seconds, "s", "one worker", alone),
         Row("mapping/base/read_seconds", kept, "s", "solving", seconds),
@@ -86,9 +86,9 @@ def base_rows() -> list[Row]:
 
 def _field_row(plan: Plan, maps: tuple[HarmonicMap, ...]) -> Row:
     """The field of the largest map at one point, beside a sum over its sources in numpy."""
-    index = int(np.argmax([harmonic_map.certificate.unknowns for harmonic_map in maps]))
+    index = int(np.argmax([harmonic_map.accuracy.unknowns for harmonic_map in maps]))
     field, point = VelocityField(maps[index]), plan.cells[index].tidied.representative_point().coords[0]
-    sources = np.exp(1j * np.arange(maps[index].certificate.unknowns))
+    sources = np.exp(1j * np.arange(maps[index].accuracy.unknowns))
     sums = best_seconds(lambda: [np.sum(1.0 / (sources - 0.1)) for _ in range(_POINTS)], 3)
     seconds = best_seconds(lambda: [field(point) for _ in range(_POINTS)], 3)
     peer = f"sum over {len(sources)} sources"

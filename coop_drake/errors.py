@@ -89,7 +89,7 @@ class PatienceError(CoopDrakeError):
 
 
 class FieldError(CoopDrakeError):
-    """A harmonic map cannot be built or its certificate failed; the message names the corner or gap."""
+    """A harmonic map cannot be built, or its error is too large; the message names the corner or gap."""
 
 
 class UnmappableError(FieldError):

@@ -1,4 +1,4 @@
-"""The maps of a run: certified in a file, kept for later runs, forgotten on demand."""
+"""The maps of a run: estimated in a file, kept for later runs, forgotten on demand."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import pytest
 from typer.testing import CliRunner
 
 from coop_drake.cli import app
-from coop_drake.cli.maps import map_cache, map_cells, write_certificates
+from coop_drake.cli.maps import map_cache, map_cells, write_accuracies
 from coop_drake.cli.reporter import Reporter
 from coop_drake.cli.results import ResultFolder
 from coop_drake.cli.task import read_task
@@ -35,19 +35,19 @@ def shown(*arguments):
     return json.loads(result.stdout)
 
 
-def test_certificates_of_all_cells_are_written_and_summed_up(tmp_path):
+def test_accuracies_of_all_cells_are_written_and_summed_up(tmp_path):
     task, reporter, folder = (
         task_with(tmp_path, 1e-9),
         Reporter(machine=True, quiet=True),
         ResultFolder(tmp_path),
     )
     maps = map_cells(task, PLAN, reporter, fresh=True)
-    write_certificates(task, maps, folder)
+    write_accuracies(task, maps, folder)
     document = json.loads((folder.path / "maps.json").read_text())
     assert document["tolerance"] == 1e-9
     rows = document["maps"]
     assert [row["cell"] for row in rows] == list(range(len(PLAN.cells)))
-    assert all(0.0 < row["residual"] <= row["error_bound"] <= 1e-9 for row in rows)
+    assert all(0.0 < row["residual"] <= row["error_estimate"] <= 1e-9 for row in rows)
     assert all(
         row["condition"] > 1.0 and row["unknowns"] > 0 and row["worst_place_description"] for row in rows
     )

@@ -63,10 +63,10 @@ def map_cells(task: Task, plan: Plan, reporter: Reporter, *, fresh: bool = False
     return maps
 
 
-def write_certificates(task: Task, maps: tuple[HarmonicMap, ...], folder: ResultFolder) -> None:
-    """Write the certified accuracy of every map as ``maps.json``."""
+def write_accuracies(task: Task, maps: tuple[HarmonicMap, ...], folder: ResultFolder) -> None:
+    """Write the estimated accuracy of every map as ``maps.json``."""
     from coop_drake.files import write_atomically
-    from coop_drake.simulation import certificate_rows
+    from coop_drake.simulation import accuracy_rows
 
-    document = {"tolerance": task.scenario.maps.tolerance, "maps": certificate_rows(maps)}
+    document = {"tolerance": task.scenario.maps.tolerance, "maps": accuracy_rows(maps)}
     write_atomically(folder.path / "maps.json", json.dumps(document, indent=1).encode() + b"\n")

@@ -82,7 +82,7 @@ BudgetName = Annotated[
     typer.Option(
         "--budget",
         metavar="all|position|FILE",
-        help="Departures from the ideal team that the plan shall provably tolerate: all of the scenario, "
+        help="Departures from the ideal team that the plan shall tolerate: all of the scenario, "
         "these for the object's position alone, or those of a file.",
     ),
 ]

@@ -12,7 +12,7 @@ import typer
 from rich.markup import escape
 
 from coop_drake.cli.live import live_page
-from coop_drake.cli.maps import map_cells, write_certificates
+from coop_drake.cli.maps import map_cells, write_accuracies
 from coop_drake.cli.options import (
     Apart,
     BlocksName,
@@ -166,7 +166,7 @@ def carry_out(
 ) -> ExitCode:
     """Simulate a plan and record it; a violated invariant or a goal not reached is a failed run.
 
-    Log, certificates of maps, recording and figures go to the folder; a live ``page`` shows the run, then
+    Log, accuracies of maps, recording and figures go to the folder; a live ``page`` shows the run, then
     the recording.
     """
     drawing.begin(task.scenario, task.problem, plan)
@@ -176,7 +176,7 @@ def carry_out(
         page.show_verdict(log)
     folder.begin("simulation", robots=log.robot_names)
     drawing.draw(log, folder.path)
-    write_certificates(task, maps, folder)
+    write_accuracies(task, maps, folder)
     log.save(folder.path / "log.npz")
     with reporter.stage("recording", "drawing"):
         drawing.wait("recording")

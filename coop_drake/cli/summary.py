@@ -164,14 +164,14 @@ def plan_facts(plan: Plan) -> dict[str, Any]:
 
 
 def map_facts(maps: Sequence[HarmonicMap]) -> dict[str, Any]:
-    """Return how well the maps are certified."""
-    certificates = [harmonic_map.certificate for harmonic_map in maps]
+    """Return how accurate the maps are."""
+    accuracies = [harmonic_map.accuracy for harmonic_map in maps]
     return {
         "maps": len(maps),
-        "max_map_residual": max(certificate.residual for certificate in certificates),
-        "max_map_error_bound": max(certificate.error_bound for certificate in certificates),
-        "max_map_unknowns": max(certificate.unknowns for certificate in certificates),
-        "max_map_condition": max(certificate.condition for certificate in certificates),
+        "max_map_residual": max(accuracy.residual for accuracy in accuracies),
+        "max_map_error_estimate": max(accuracy.error_estimate for accuracy in accuracies),
+        "max_map_unknowns": max(accuracy.unknowns for accuracy in accuracies),
+        "max_map_condition": max(accuracy.condition for accuracy in accuracies),
     }
 
 

@@ -1,5 +1,5 @@
+from .accuracy import MapAccuracy
 from .blunting import blunted
-from .certificate import MapCertificate
 from .cuts import cut_open
 from .harmonic_map import HarmonicMap
 from .store import MapStore
@@ -8,7 +8,7 @@ from .velocity_field import VelocityField
 
 __all__ = [
     "HarmonicMap",
-    "MapCertificate",
+    "MapAccuracy",
     "MapStore",
     "Streamlines",
     "VelocityField",

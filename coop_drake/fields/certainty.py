@@ -1,4 +1,4 @@
-"""Bounds the error of a velocity field's direction, which grows where the Jacobian is nearly singular."""
+"""Estimates the error of a velocity field's direction, which grows where the Jacobian is nearly singular."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ _LEAST_DISTANCE = 0.1
 
 
 def direction_error(harmonic_map: HarmonicMap, points: FloatArray, distance: FloatArray) -> FloatArray:
-    """Bound on the error of the direction of adj(J) (q_d - T).
+    """Estimate the largest error of the direction of adj(J) (q_d - T).
 
-    The error of T is harmonic, and so is each of its components, along whatever axis; none is above the
-    certificate's bound e. So the error of J is at most 4 e / (pi r) in the spectral norm at a distance r from
-    the boundary, that of q_d - T at most 2 e, and in the plane adj(J) has the norm of J.
+    The error of T is harmonic, and so is each of its components, along whatever axis; none is above e, for
+    which the estimate stands. So the error of J is at most 4 e / (pi r) in the spectral norm at a distance r
+    from the boundary, that of q_d - T at most 2 e, and in the plane adj(J) has the norm of J.
 
     Args:
         harmonic_map: The map.
@@ -41,7 +41,7 @@ def direction_error(harmonic_map: HarmonicMap, points: FloatArray, distance: Flo
     line = harmonic_map.goal_image - T
     x = J[:, 1, 1] * line[:, 0] - J[:, 0, 1] * line[:, 1]
     y = J[:, 0, 0] * line[:, 1] - J[:, 1, 0] * line[:, 0]
-    error = harmonic_map.certificate.error_bound
+    error = harmonic_map.accuracy.error_estimate
     of_J, of_line = 4.0 * error / (pi * np.maximum(distance, 1e-300)), 2.0 * error
     lost = of_J * (np.hypot(*line.T) + of_line) + np.linalg.norm(J, axis=(1, 2)) * of_line
     return np.asarray(lost / np.maximum(np.hypot(x, y), 1e-300))

@@ -1,11 +1,11 @@
-"""The harmonic map of a polygon to the unit disk, certified."""
+"""The harmonic map of a polygon to the unit disk, with an estimate of its error."""
 
 from __future__ import annotations
 
 from numpy.typing import ArrayLike
 from shapely import Point, Polygon
 
-from coop_drake.fields.certificate import MapCertificate
+from coop_drake.fields.accuracy import MapAccuracy
 from coop_drake.fields.evaluation import evaluate_many
 from coop_drake.fields.goals import region_to_map
 from coop_drake.fields.outline import outline_of
@@ -32,7 +32,7 @@ class HarmonicMap:
     Args:
         domain: The cell, with or without holes [m].
         goal: Point to reach, or region of the domain to collapse.
-        tolerance: Largest error of T that is accepted, as certified.
+        tolerance: Largest estimated error of T that is accepted.
         inside: A point of the piece to map where a goal region splits the domain.
         solution: The result of solving with these arguments before; None to solve.
 
@@ -82,6 +82,6 @@ class HarmonicMap:
         return self.solution.goal_image.copy()
 
     @property
-    def certificate(self) -> MapCertificate:
-        """The certified bound on the error of the map."""
-        return self.solution.certificate
+    def accuracy(self) -> MapAccuracy:
+        """How accurate the map is, as sampled on its boundary."""
+        return self.solution.accuracy

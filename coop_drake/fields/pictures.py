@@ -77,7 +77,7 @@ def residual_figure(harmonic_map: HarmonicMap, tolerance: float) -> Figure:
         tolerance: The error that was allowed.
     """
     samples = sample_boundary(harmonic_map)
-    bound = harmonic_map.certificate.error_bound
+    bound = harmonic_map.accuracy.error_estimate
     figure = new_figure(
         2.0 * _SIDE,
         0.75 * _SIDE,
@@ -91,7 +91,7 @@ def residual_figure(harmonic_map: HarmonicMap, tolerance: float) -> Figure:
         residual = np.maximum(samples.residual[here], _FLOOR)
         ax.semilogy(samples.arc_length[here], residual, color=colour, linewidth=0.9, label=label)
     ax.axhline(tolerance, color=INK, linestyle="--", linewidth=1.2, label=f"tolerance, {tolerance:.0e}")
-    ax.axhline(bound, color=GREEN, linewidth=1.2, label="certified bound")
+    ax.axhline(bound, color=GREEN, linewidth=1.2, label="estimated largest error")
     for place, letter in _letters(samples):
         ax.axvline(samples.vertex_arc_length[place], color=WALL, linewidth=0.8, zorder=0)
         ax.annotate(

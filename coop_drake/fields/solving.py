@@ -8,7 +8,7 @@ import numpy as np
 from shapely import Point, Polygon
 
 from coop_drake.errors import UnmappableError
-from coop_drake.fields.certificate import MapCertificate, certify, find_fault
+from coop_drake.fields.accuracy import MapAccuracy, estimate_accuracy, find_fault
 from coop_drake.fields.corners import leg_panels
 from coop_drake.fields.density import solve_density
 from coop_drake.fields.evaluation import evaluate_many
@@ -48,12 +48,12 @@ class Solution(NamedTuple):
     Attributes:
         flat: The map for compiled code, see `flat_map`.
         goal_image: q_d, the goal's image in the disk, shape (2,).
-        certificate: How far the map can be from the true one.
+        accuracy: How far the map is estimated to be from the true one.
     """
 
     flat: FlatMap
     goal_image: FloatArray
-    certificate: MapCertificate
+    accuracy: MapAccuracy
 
     @property
     def arrays(self) -> MapArrays:
@@ -67,7 +67,7 @@ class Solution(NamedTuple):
 
 
 def solve(outline: Outline, goal: Point | Polygon, tolerance: float) -> Solution:
-    """Solve with more and more nodes until the certified error is within the tolerance.
+    """Solve with more and more nodes until the estimated error is within the tolerance.
 
     The image of the goal, the target, is looked up if it is a point.
 
@@ -75,10 +75,10 @@ def solve(outline: Outline, goal: Point | Polygon, tolerance: float) -> Solution
         UnmappableError: If more nodes do not reduce the error, or would be too many, or the system is so
             close to singular, as narrow gaps make it, that rounding alone may exceed the tolerance.
     """
-    best: MapCertificate | None = None
+    best: MapAccuracy | None = None
     last = _FEWEST
     for attempt in _ATTEMPTS:
-        if best is not None and not _is_promising(attempt, last, best.error_bound / tolerance):
+        if best is not None and not _is_promising(attempt, last, best.error_estimate / tolerance):
             continue
         panels = lay_panels(outline, attempt.closeness)
         unknowns = _unknowns(outline, panels, attempt)
@@ -87,12 +87,12 @@ def solve(outline: Outline, goal: Point | Polygon, tolerance: float) -> Solution
         if unknowns > _MAX_UNKNOWNS:
             _refuse(best, tolerance, outline, panels, unknowns)
         solution = _solve(outline, goal, panels, attempt)
-        bound = solution.certificate.error_bound
+        bound = solution.accuracy.error_estimate
         if bound <= tolerance:
             return solution
-        if best is not None and bound > _PROGRESS * best.error_bound:
+        if best is not None and bound > _PROGRESS * best.error_estimate:
             break
-        best, last = solution.certificate, attempt
+        best, last = solution.accuracy, attempt
         if _EPSILON * best.condition > tolerance:  # more nodes do not reduce rounding errors
             break
     _refuse(best, tolerance, outline, panels, unknowns)
@@ -126,8 +126,8 @@ def _solve(outline: Outline, goal: Point | Polygon, panels: Panels, attempt: Att
     arrays = pack_layers(outline, panels, angles, density, attempt.closeness)
     flat = flatten(arrays, centre, rounding)
     unknowns = len(density.weighted) + outline.holes
-    certificate = certify(outline, panels, flat, density.hole_images, unknowns, density.condition)
-    return Solution(flat, _goal_image(outline, goal, density.hole_images, flat), certificate)
+    accuracy = estimate_accuracy(outline, panels, flat, density.hole_images, unknowns, density.condition)
+    return Solution(flat, _goal_image(outline, goal, density.hole_images, flat), accuracy)
 
 
 def _goal_image(
@@ -146,14 +146,14 @@ def _goal_image(
 
 
 def _refuse(
-    best: MapCertificate | None, tolerance: float, outline: Outline, panels: Panels, unknowns: int
+    best: MapAccuracy | None, tolerance: float, outline: Outline, panels: Panels, unknowns: int
 ) -> NoReturn:
     """Raise an error with the place where the best attempt is worst, or the narrowest gap without one."""
     if best is not None:
         rounding = _EPSILON * best.condition
         why = f", and rounding alone may cost {rounding:.2g}" if rounding > tolerance else ""
         raise UnmappableError(
-            f"the harmonic map is certified to {best.error_bound:.2g} only, {tolerance:.2g} was asked for"
+            f"the harmonic map is accurate to about {best.error_estimate:.2g}; {tolerance:.2g} was asked for"
             f"{why}; at fault is {best.worst_place_description}",
             (float(best.worst_place[0]), float(best.worst_place[1])),
             angle=best.worst_angle,

@@ -19,7 +19,7 @@ import shapely
 from shapely import Point, Polygon
 
 from coop_drake.compiled import MAKERS
-from coop_drake.fields.certificate import MapCertificate
+from coop_drake.fields.accuracy import MapAccuracy
 from coop_drake.fields.harmonic_map import HarmonicMap
 from coop_drake.fields.solving import Solution
 from coop_drake.files import write_atomically
@@ -133,7 +133,7 @@ def _read(path: Path, key: str) -> Solution | None:
             solution = Solution(
                 flat=file["flat"],
                 goal_image=file["goal_image"],
-                certificate=_certificate(file["certificate"].item()),
+                accuracy=_accuracy(file["accuracy"].item()),
             )
         path.touch()  # used just now
     except _DAMAGE:
@@ -144,13 +144,13 @@ def _read(path: Path, key: str) -> Solution | None:
 def _write(path: Path, key: str, solution: Solution) -> None:
     """Write a solution; nothing happens if the folder cannot be written."""
     flat, image = solution.flat, solution.goal_image
-    certificate = json.dumps(solution.certificate.plain())
+    accuracy = json.dumps(solution.accuracy.plain())
     with suppress(OSError):
         write_atomically(
-            path, lambda file: np.savez(file, key=key, flat=flat, goal_image=image, certificate=certificate)
+            path, lambda file: np.savez(file, key=key, flat=flat, goal_image=image, accuracy=accuracy)
         )
 
 
-def _certificate(text: str) -> MapCertificate:
+def _accuracy(text: str) -> MapAccuracy:
     values: dict[str, Any] = json.loads(text)
-    return MapCertificate(**values | {"worst_place": np.array(values["worst_place"])})
+    return MapAccuracy(**values | {"worst_place": np.array(values["worst_place"])})

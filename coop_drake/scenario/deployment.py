@@ -281,7 +281,7 @@ class Deployment:
         floor: Friction and slope of the floor.
         pushes: Forces from outside.
         start_offset: How far the team stands away from the plan's start.
-        budget: Under which budget of these departures a plan must provably hold: ``none``, ``position`` for
+        budget: Under which budget of these departures a plan must hold: ``none``, ``position`` for
             the object's position alone, ``all`` for angles and joints, too; needs a control rate.
         seed: Seed of noise and losses.
     """

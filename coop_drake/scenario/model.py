@@ -156,7 +156,7 @@ class MapSettings:
     """Accuracy of the harmonic maps of the cells.
 
     Attributes:
-        tolerance: Largest certified error of a harmonic map onto the disk of radius 1 [-]. Cells that cannot
+        tolerance: Largest estimated error of a harmonic map onto the disk of radius 1 [-]. Cells that cannot
             be mapped as accurately are refused.
     """
 

@@ -1,6 +1,6 @@
 from .clearance import Clearance, TeamClearance
 from .invariants import ACCELERATION_TOLERANCE, WRENCH_TOLERANCE, Invariants, Margins
-from .maps import build_maps, certificate_rows
+from .maps import accuracy_rows, build_maps
 from .message_statistics import MessageStatistics, communication
 from .run import configure_simulator, run_loop, simulate
 from .telemetry import Sample
@@ -14,8 +14,8 @@ __all__ = [
     "MessageStatistics",
     "Sample",
     "TeamClearance",
+    "accuracy_rows",
     "build_maps",
-    "certificate_rows",
     "communication",
     "configure_simulator",
     "run_loop",

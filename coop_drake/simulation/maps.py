@@ -32,13 +32,13 @@ def build_maps(
 
     Args:
         plan: The plan.
-        tolerance: Largest certified error accepted; a scenario's is ``maps.tolerance`` [-].
+        tolerance: Largest estimated error accepted; a scenario's is ``maps.tolerance`` [-].
         store: Where maps are looked up first and kept; by default all are solved.
         workers: How many maps are solved at the same time; by default one a core, eight at most.
         progress: Called with the stage and the fraction done, if given.
 
     Raises:
-        FieldError: A map cannot be built or its certificate fails; the message names the cell.
+        FieldError: A map cannot be built or its estimated error is too large; the message names the cell.
     """
 
     def solve(index: int) -> HarmonicMap:
@@ -66,10 +66,10 @@ def build_maps(
     return tuple(maps)
 
 
-def certificate_rows(maps: Sequence[HarmonicMap]) -> list[dict[str, Any]]:
-    """Return the certificates of maps as plain values by the names of `MapCertificate`, cells from 0."""
+def accuracy_rows(maps: Sequence[HarmonicMap]) -> list[dict[str, Any]]:
+    """Return the accuracy of maps as plain values by the names of `MapAccuracy`, cells from 0."""
     rows = []
     for cell, harmonic_map in enumerate(maps):
         vertices = len(harmonic_map.solution.arrays.edges)
-        rows.append({"cell": cell, "vertices": vertices, **harmonic_map.certificate.plain()})
+        rows.append({"cell": cell, "vertices": vertices, **harmonic_map.accuracy.plain()})
     return rows

@@ -34,7 +34,7 @@ def test_sharp_corners_become_blunt_inside_the_domain(name):
     size = np.hypot(*np.subtract(domain.bounds[2:], domain.bounds[:2]))
     assert domain.buffer(1e-12 * size).covers(blunt)
     assert domain.difference(blunt).area < 4e-4 * size**2
-    assert HarmonicMap(blunt, goal, tolerance=1e-6).certificate.error_bound <= 1e-6
+    assert HarmonicMap(blunt, goal, tolerance=1e-6).accuracy.error_estimate <= 1e-6
 
 
 def test_only_the_surroundings_of_a_tip_change():

@@ -17,11 +17,11 @@ ROOM = box(0, 0, 6, 4).difference(box(2, 1, 3, 3))
 @pytest.mark.parametrize(
     "goal", [Point(5, 2), box(5, 1, 6, 3), box(4, 1.5, 5, 2.5)], ids=["point", "arc", "hole"]
 )
-def test_the_residual_stays_below_the_certified_bound(goal):
+def test_the_residual_stays_below_the_estimate(goal):
     mapped = HarmonicMap(ROOM, goal, tolerance=1e-7)
     samples = sample_boundary(mapped, 33)
     # The mean of a hole's samples may be off by as much as a sample.
-    assert samples.residual.max() <= 2.0 * mapped.certificate.error_bound
+    assert samples.residual.max() <= 2.0 * mapped.accuracy.error_estimate
     assert samples.residual.shape == samples.arc_length.shape == samples.ring.shape
 
 

@@ -45,8 +45,8 @@ def test_series_change_nothing(mapped):
     points = np.concatenate((domains.inside(mapped.region, 400), walls, walls + 1e-4 * normals)) - centre
     T, J = evaluate_many(flat, points)
     T_all, J_all = evaluate_many(alone, points)
-    # Far panels act through the solved nodes or the refined ones: they agree as well as the map is certified.
-    np.testing.assert_allclose(T, T_all, atol=mapped.certificate.error_bound + 1e-11)
+    # Far panels act through the solved nodes or the refined ones: they agree as well as the map is accurate.
+    np.testing.assert_allclose(T, T_all, atol=mapped.accuracy.error_estimate + 1e-11)
     np.testing.assert_allclose(J, J_all, atol=1e-6 * np.abs(J_all).max())
 
 

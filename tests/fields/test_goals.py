@@ -133,7 +133,7 @@ def test_edges_as_short_as_rounding_are_left_out_inward():
     assert len(region.exterior.coords) == 6
     assert kinked.buffer(1e-15).covers(region)
     assert kinked.difference(region).area < 1e-7
-    assert HarmonicMap(kinked, Point(0.5, 0.5), tolerance=1e-8).certificate.error_bound <= 1e-8
+    assert HarmonicMap(kinked, Point(0.5, 0.5), tolerance=1e-8).accuracy.error_estimate <= 1e-8
 
 
 def test_a_third_coordinate_does_no_harm():

@@ -61,7 +61,7 @@ def test_rectangle_agrees_with_its_series():
 def test_map_agrees_with_an_independent_solver(domain):
     oracle = Lightning(domain, poles=40, degree=40)
     harmonic_map = HarmonicMap(domain, domain.representative_point())
-    bound = harmonic_map.certificate.error_bound + 3 * oracle.residual
+    bound = harmonic_map.accuracy.error_estimate + 3 * oracle.residual
     assert bound < 1e-5
     points = domains.inside(domain, 200, clearance=0.01)
     T, _ = harmonic_map(points)
@@ -117,7 +117,7 @@ def test_jacobian_a_centimetre_from_walls_is_that_of_a_finer_map(name, finest):
     points, _ = domains.off_wall(domain, 0.01)
     points = points[shapely.contains_xy(domain.buffer(-0.0099), *points.T)][::7]
     plain, finer = HarmonicMap(domain, goal), HarmonicMap(domain, goal, tolerance=finest)
-    assert finer.certificate.unknowns > plain.certificate.unknowns
+    assert finer.accuracy.unknowns > plain.accuracy.unknowns
     h = 5e-4
     differences = []
     for axis in np.eye(2):

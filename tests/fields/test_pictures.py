@@ -63,7 +63,7 @@ def test_the_residual_stays_under_the_drawn_bound(mapped):
     (ax,) = residual_figure(mapped, 1e-7).axes
     outer, hole, tolerance, bound = (np.asarray(line.get_ydata(), dtype=float) for line in ax.lines[:4])
     assert tolerance[0] == 1e-7
-    assert bound[0] == mapped.certificate.error_bound
+    assert bound[0] == mapped.accuracy.error_estimate
     assert outer.max() <= bound[0]
     assert hole.max() <= 2.0 * bound[0]
 

@@ -30,8 +30,8 @@ def same(one, other):
         and np.array_equal(VelocityField(one)(points[0]), VelocityField(other)(points[0]))
         and one.region.equals_exact(other.region)
         and all(
-            np.array_equal(getattr(one.certificate, f.name), getattr(other.certificate, f.name))
-            for f in dataclasses.fields(one.certificate)
+            np.array_equal(getattr(one.accuracy, f.name), getattr(other.accuracy, f.name))
+            for f in dataclasses.fields(one.accuracy)
         )
     )
 

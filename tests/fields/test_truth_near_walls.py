@@ -57,7 +57,7 @@ def test_disk_is_kept_and_nothing_is_folded(mapped):
     assert (np.hypot(*T.T) < 1.0).all()
     # The error of T is harmonic and bounded: its gradient is at most 4 / pi times bound over distance.
     distance = BoundaryDistance(mapped.region).batch(everywhere)
-    J_error = np.sqrt(2.0) * 4.0 / np.pi * mapped.certificate.error_bound / distance
+    J_error = np.sqrt(2.0) * 4.0 / np.pi * mapped.accuracy.error_estimate / distance
     det_error = 2.0 * np.linalg.norm(J, 2, axis=(1, 2)) * J_error + J_error**2
     det = np.linalg.det(J)
     assert (det > -det_error).all()
@@ -75,4 +75,4 @@ def test_walls_and_vertices_have_values(mapped):
         T, J = mapped(points)
         assert np.isfinite(T).all()
         assert np.isfinite(J).all()
-        assert (np.hypot(*T.T) <= 1.0 + 1.5 * mapped.certificate.error_bound).all()
+        assert (np.hypot(*T.T) <= 1.0 + 1.5 * mapped.accuracy.error_estimate).all()

@@ -32,9 +32,9 @@ def bits(maps):
     return [a_map.solution.flat.tobytes() for a_map in maps]
 
 
-def test_every_map_is_certified_to_the_tolerance(plan):
-    assert max(a_map.certificate.error_bound for a_map in build_maps(plan)) <= TOLERANCE
-    assert max(a_map.certificate.error_bound for a_map in build_maps(plan, tolerance=1e-9)) <= 1e-9
+def test_every_map_is_accurate_to_the_tolerance(plan):
+    assert max(a_map.accuracy.error_estimate for a_map in build_maps(plan)) <= TOLERANCE
+    assert max(a_map.accuracy.error_estimate for a_map in build_maps(plan, tolerance=1e-9)) <= 1e-9
 
 
 def test_workers_and_the_store_change_nothing(plan, tmp_path):
@@ -55,7 +55,7 @@ def test_progress_is_told_in_the_order_of_the_cells(plan):
 def test_the_first_cell_that_cannot_be_mapped_is_named(plan):
     with pytest.raises(FieldError, match="cell 1 of 3: "):
         build_maps(with_targets(plan, 1, 2))
-    with pytest.raises(FieldError, match=r"cell 0 of 3: .*certified to"):
+    with pytest.raises(FieldError, match=r"cell 0 of 3: .*accurate to about"):
         build_maps(plan, tolerance=1e-17)
 
 

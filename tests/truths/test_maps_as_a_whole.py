@@ -55,8 +55,8 @@ def test_nothing_flows_into_a_hole(mapped):
         room = hole.distance(walls.difference(hole.boundary))
         way = shapely.segmentize(hole.buffer(0.4 * room).exterior, 0.2 * room)
         flux, across = flux_through(mapped, shapely.get_coordinates(way))
-        # The error of T is harmonic and at most the certified one: so steep it can be at this distance.
-        error = 4.0 * mapped.certificate.error_bound / (np.pi * walls.distance(way)) * way.length
+        # The error of T is harmonic and at most the estimated one: so steep it can be at this distance.
+        error = 4.0 * mapped.accuracy.error_estimate / (np.pi * walls.distance(way)) * way.length
         assert np.hypot(*flux) < error
         assert error < 1e-4 * across
 

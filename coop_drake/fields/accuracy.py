@@ -1,4 +1,4 @@
-"""Certifies a map: its residual, sampled on the boundary between the solved nodes, and the error bound."""
+"""Estimates the error of a map: its residual, sampled on the boundary between the solved nodes."""
 
 from __future__ import annotations
 
@@ -23,15 +23,16 @@ _RINGS = np.array([0, 1, 2, 3, 5, 8, 13, 21, 33])
 
 
 @dataclass(frozen=True)
-class MapCertificate:
-    """How far a computed map can be from the true one.
+class MapAccuracy:
+    """How far a computed map is from the true one, as samples of its boundary say.
 
     The error is harmonic, has no flux around any hole, and on every hole it is a constant up to the residual.
-    With M holes it is nowhere larger than (2 M + 1) times the largest boundary residual.
+    With M holes it is nowhere larger than (2 M + 1) times the largest residual of all boundary points. The
+    largest one of the samples stands for that, so that the result is an estimate, not a bound.
 
     Attributes:
         residual: Largest distance of the image of a boundary sample from where it belongs.
-        error_bound: (2 M + 1) times that.
+        error_estimate: (2 M + 1) times that.
         samples: Number of boundary samples.
         unknowns: Size of the linear system.
         condition: Estimate of its condition in the 1-norm.
@@ -42,7 +43,7 @@ class MapCertificate:
     """
 
     residual: float
-    error_bound: float
+    error_estimate: float
     samples: int
     unknowns: int
     condition: float
@@ -71,9 +72,9 @@ class Fault(NamedTuple):
     gap: float | None
 
 
-def certify(
+def estimate_accuracy(
     outline: Outline, panels: Panels, flat: FlatMap, hole_images: FloatArray, unknowns: int, condition: float
-) -> MapCertificate:
+) -> MapAccuracy:
     """Sample the residual on every panel and far down every corner of a map, evaluated as its users do.
 
     The images of the holes, c_k, have shape (holes, 2); the size of the linear system and its condition are
@@ -89,9 +90,9 @@ def certify(
     worst = int(np.argmax(residuals))
     place = position[worst] + outline.centre
     fault = find_fault(outline, panels, position[worst], int(edge[worst]))
-    return MapCertificate(
+    return MapAccuracy(
         residual=float(residuals[worst]),
-        error_bound=float((2 * outline.holes + 1) * residuals[worst]),
+        error_estimate=float((2 * outline.holes + 1) * residuals[worst]),
         samples=len(position),
         unknowns=unknowns,
         condition=condition,

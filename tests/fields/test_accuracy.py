@@ -25,23 +25,23 @@ ELL = Polygon([(0, 0), (2, 0), (2, 1), (1, 1), (1, 2), (0, 2)])
     ],
     ids=lambda value: None,
 )
-def test_clean_and_nasty_domains_are_certified(domain, goal):
-    certificate = HarmonicMap(domain, goal).certificate
+def test_clean_and_nasty_domains_are_accurate(domain, goal):
+    accuracy = HarmonicMap(domain, goal).accuracy
     holes = len(domain.interiors)
-    assert certificate.residual <= 1e-6
-    assert certificate.error_bound == (2 * holes + 1) * certificate.residual
-    assert certificate.samples > certificate.unknowns
-    assert 1.0 < certificate.condition < 1e7
+    assert accuracy.residual <= 1e-6
+    assert accuracy.error_estimate == (2 * holes + 1) * accuracy.residual
+    assert accuracy.samples > accuracy.unknowns
+    assert 1.0 < accuracy.condition < 1e7
 
 
 def test_more_is_spent_where_more_is_asked():
     plain, fine = HarmonicMap(ELL, Point(0.5, 0.5)), HarmonicMap(ELL, Point(0.5, 0.5), tolerance=2e-10)
-    assert fine.certificate.unknowns > plain.certificate.unknowns
-    assert fine.certificate.error_bound <= 2e-10 < plain.certificate.error_bound
+    assert fine.accuracy.unknowns > plain.accuracy.unknowns
+    assert fine.accuracy.error_estimate <= 2e-10 < plain.accuracy.error_estimate
 
 
 def test_refusal_names_the_corner_at_fault():
-    message = r"certified to .* only, 1e-16 was asked for.*; at fault is the corner at \("
+    message = r"accurate to about .*; 1e-16 was asked for.*; at fault is the corner at \("
     with pytest.raises(FieldError, match=message):
         HarmonicMap(ELL, Point(0.5, 0.5), tolerance=1e-16)
 
@@ -62,9 +62,9 @@ def test_a_gap_too_narrow_for_any_number_of_nodes_is_refused_at_the_first_attemp
 
 def test_a_narrow_gap_that_does_no_harm_is_mapped():
     between_pillars = box(0, 0, 4, 3).difference(box(1, 1, 2, 2)).difference(box(2 + 1e-6, 1, 3, 2))
-    certificate = HarmonicMap(between_pillars, Point(3.5, 0.5)).certificate
-    assert certificate.error_bound <= 1e-8
-    assert certificate.condition * np.finfo(float).eps > 1e-8
+    accuracy = HarmonicMap(between_pillars, Point(3.5, 0.5)).accuracy
+    assert accuracy.error_estimate <= 1e-8
+    assert accuracy.condition * np.finfo(float).eps > 1e-8
 
 
 def test_refusal_of_a_domain_too_fine_names_the_gap():
