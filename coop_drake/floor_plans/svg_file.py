@@ -331,7 +331,7 @@ class _Walk:
             area = Polygon(points) if len(points) > 2 else Polygon()
             if not area.is_valid or any(area.intersects(other) for other in areas):
                 raise self.refuse(element, "a clip path whose outlines meet is not read", remedy)
-            areas.append(area.buffer(strays, join_style="mitre") if strays else area)
+            areas.append(area.buffer(1.02 * strays, join_style="mitre") if strays else area)
         return areas
 
     def _shape(self, element: Element, tag: str, style: _Style) -> Iterator[Wall]:
@@ -354,13 +354,16 @@ class _Walk:
             if closed and (points[0] == points[-1]).all():
                 points = points[:-1]
             closed = closed and len(points) > 2
-            half_width = 0.5 * width * most * self.page.metre + strays if stroked else strays
+            # The end of a curve, or of what is stretched, is no edge at a right angle to the last chord.
+            plain = even and strays == 0.0
+            square = 1.0 if plain or values["stroke-linecap"] != "square" else 2.0**0.5
+            half_width = 0.5 * width * square * most * self.page.metre + strays if stroked else strays
             yield Wall(
                 points,
                 half_width,
                 closed,
                 name_of(element),
-                flat=even and strays == 0.0 and values["stroke-linecap"] == "butt",
+                flat=plain and values["stroke-linecap"] == "butt",
                 mitre=self._mitre(points, closed, values, most / least if least else inf) if stroked else 2.0,
                 clip=style.clip,
             )
