@@ -45,8 +45,9 @@ class RobotNode:
     drives brake.
 
     Sensors may show the object's angle and joints without limits in any turn: each value counts in the turn
-    in which it is nearest to the one before, at first to the plan's start, and to the middle of the current
-    cell where the process was started again.
+    in which it is nearest to the one before, kept to the current cell's interval, so that wrong values do not
+    count turns; at first to the plan's start, and to the middle of the cell where the process was started
+    again.
 
     Args:
         knowledge: What the robot knows before the run.
@@ -83,7 +84,8 @@ class RobotNode:
         self._waits, self._number = (np.zeros(2), 0), 0
         endless = [3 + i for i, joint in enumerate(knowledge.robot.joints) if is_circle(joint)]
         self._circles = [self._state_size + 2, *endless]
-        self._middles = [0.5 * (cell.lower + cell.upper)[axes] for cell in knowledge.plan.cells]
+        ends = [(cell.lower[axes], cell.upper[axes]) for cell in knowledge.plan.cells]
+        self._turns = [(self._of_circles(lower), self._of_circles(upper)) for lower, upper in ends]
         self._near = self._of_circles(knowledge.plan.start[2:][axes])
         start = np.array(knowledge.plan.start[:3])
         self._sampled.at(0.0, self._inputs(np.concatenate([np.zeros(self._state_size), start])))
@@ -135,7 +137,8 @@ class RobotNode:
         """
         self._number = period_of(time, self.period) if sample is None else sample
         measured = self._unwrapped(measured)
-        self._near = measured[self._circles] if np.isfinite(measured).all() else self._near
+        if self.place.known and np.isfinite(measured).all():
+            self._near = np.clip(measured[self._circles], *self._turns[self.place.cell])
         if not self._follows(time, measured, stopped=stopped):
             return np.zeros(3 + self._joints), self._stand(time, measured) if self.place.known else []
         self._sampled.at(time, self._inputs(measured))
@@ -167,7 +170,7 @@ class RobotNode:
 
     def _enter(self, cell: int, sample: int) -> None:
         if self.state == ASKS:
-            self.state, self._near = STANDS, self._of_circles(self._middles[cell])
+            self.state, self._near = STANDS, np.mean(self._turns[cell], axis=0)
         self.place, self._cell = Place(True, cell, sample), np.array([cell, sample * self.period])
 
     def _follows(self, time: float, measured: FloatArray, *, stopped: bool) -> bool:

@@ -80,6 +80,13 @@ def test_an_order_counts_in_the_turn_that_the_robot_knows(robots):
     np.testing.assert_allclose(efforts[1:], [efforts[0]] * 2, atol=1e-6)
 
 
+def test_wrong_values_do_not_count_turns(robots):
+    node, measured = robots[0], at_start()
+    for number, off in enumerate((0.0, -2.8, -5.6, -8.4, np.nan)):
+        node.step(number * PERIOD, np.where(np.arange(11) == 10, measured + off, measured), stopped=True)
+    np.testing.assert_allclose(node._unwrapped(measured), measured, atol=1e-12)
+
+
 def test_a_robot_that_hears_the_order_too_late_stands_on(robots):
     node, measured = robots[0], at_start()
     stand(node, measured, 20)
