@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from itertools import pairwise
-from math import isclose, remainder, tau
+from math import dist, isclose, remainder, tau
 from typing import Any
 
 import numpy as np
@@ -59,11 +59,9 @@ def _ends(question: Document, answer: Document) -> str:
         return "the start's angles lie outside"
     if not place.buffer(SURELY).contains(Point(start[:2])):
         return "the start lies outside"
-    if last["target"] != question["goal"]:
-        return "the last target is not the goal"
     most, *rooms = question["tolerances"]
-    if last["inradius"] > most * (1.0 + SURELY):
-        return "the last inradius is beyond the tolerance"
+    if dist(last["target"], question["goal"]) + last["inradius"] > most + SURELY:
+        return "the disc about the last target is beyond the tolerance"
     goals = zip(question["goal_lower"], question["goal_upper"], rooms, strict=True)
     for axis, (low, high, room) in enumerate(goals):
         for value in (last["goal_lower"][axis], last["goal_upper"][axis]):

@@ -54,7 +54,10 @@ class _ProofTruth:
         self._question, self._answer, self._random = question, answer, random
         self._team, self._slices = Team(question), answer["slices"]
         self._limits = list(zip(question["lower"], question["upper"], strict=True))
-        self._goals = list(zip(question["goal_lower"], question["goal_upper"], strict=True))
+        ends = zip(question["goal_lower"], question["goal_upper"], question["tolerances"][1:], strict=True)
+        angles, *joints = [(low - room, high + room) for low, high, room in ends]
+        within = zip(joints, self._limits, strict=True)
+        self._goals = [angles, *[(max(a[0], b[0]), min(a[1], b[1])) for a, b in within]]
         self._component, self._centre = answer["component"], np.array(answer["point"])
 
     def tiling(self) -> str:
@@ -89,7 +92,11 @@ class _ProofTruth:
                 if first != second and one.intersects(other):
                     return "cells with two labels touch"
         start = np.array([self._question["start"]])
-        goals = np.array([[*self._question["goal"], *z] for z in self._sampled(self._goals)])
+        goals = []
+        for z in self._sampled(self._goals) if all(low <= high for low, high in self._goals) else ():
+            room, turn = self._question["tolerances"][0], self._random.uniform(0.0, tau)
+            away = room * float(self._random.choice([0.0, 0.7, 1.0])) * np.array([np.cos(turn), np.sin(turn)])
+            goals.append(np.array([*(np.array(self._question["goal"]) + away), *z]))
         for z, wrong in [(start[0], False), *((z, True) for z in goals)]:
             for k, part in enumerate(self._slices):
                 place = self._point(z)

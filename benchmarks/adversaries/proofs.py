@@ -199,6 +199,13 @@ def other_ends(question: Document, answer: Document, random: Random) -> Change:
     return ANYTHING
 
 
+def wider_goal(question: Document, answer: Document, random: Random) -> Change:
+    """Tolerances of the goal are up to a thousand times as wide."""
+    factors = 10.0 ** random.uniform(0.0, 3.0, len(question["tolerances"]))
+    question["tolerances"] = (factors * question["tolerances"]).tolist()
+    return ANYTHING
+
+
 def thinner(question: Document, answer: Document, random: Random) -> Change:
     """Every piece is smaller, or a pillar of the floor is gone."""
     if question["floor"]["holes"] and random.random() < 0.3:
@@ -242,6 +249,7 @@ PROOF_ALTERATIONS: dict[str, Alteration] = {
     "another floor": other_floor,
     "another team": other_team,
     "thinner bodies": thinner,
+    "wider goal": wider_goal,
     "whole turns away": turned,
 }
 """Every kind of alteration by name."""
