@@ -140,12 +140,16 @@ def test_any_turn_of_the_goal_will_do(goal: tuple[float, float, float]) -> None:
 @pytest.mark.parametrize("aside", [0.0, 1e-9, -1e-9, -0.01])
 @pytest.mark.parametrize("end", ["start", "goal"])
 def test_an_end_at_a_wall_is_never_found(end: str, aside: float) -> None:
-    """Touching counts as a collision; less than the resolution away, or just inside the wall, is no plan."""
-    at_wall = (0.2 + aside, 0.5, 0.0)
+    """Touching counts as a collision; less than the resolution away, or just inside the wall, is no plan.
+
+    The goal reaches to there with its tolerance.
+    """
+    tolerance = question(box(0, 0, 4, 3)).position_tolerance
+    at_start, at_goal = (0.2 + aside, 0.5, 0.0), (0.2 + aside - tolerance, 0.5, 0.0)
     problem = (
-        question(box(0, 0, 4, 3), at_wall, GOAL)
+        question(box(0, 0, 4, 3), at_start, GOAL)
         if end == "start"
-        else question(box(0, 0, 4, 3), START, at_wall)
+        else question(box(0, 0, 4, 3), START, at_goal)
     )
     answer, _ = find_channel(problem)
     assert not isinstance(answer, Channel)
@@ -153,6 +157,16 @@ def test_an_end_at_a_wall_is_never_found(end: str, aside: float) -> None:
         assert not answer.proved
     if aside < -1e-3:
         assert answer.proved
+
+
+@pytest.mark.parametrize("aside", [0.0, 1e-9, -1e-9, -0.005])
+def test_a_goal_at_a_wall_is_reached_within_its_tolerance(aside: float) -> None:
+    problem = question(box(0, 0, 4, 3), START, (0.2 + aside, 0.5, 0.0))
+    channel, _ = find_channel(problem)
+    assert isinstance(channel, Channel)
+    end = channel.path[-1, :2]
+    assert end[0] > 0.201
+    assert np.hypot(*(end - problem.goal_pose[:2])) < problem.position_tolerance
 
 
 @pytest.mark.parametrize("start", [(-2.0, 0.5, 0.0), (2.5, 1.5, 0.0), (2.0, 1.5, 0.3)])

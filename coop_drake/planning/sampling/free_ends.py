@@ -23,15 +23,20 @@ WITHIN = 0.9
 
 
 def ending_freely(problem: PlanningProblem) -> PlanningProblem | None:
-    """The question of ending at a free configuration of the goal, if its middle is not free and one is found.
+    """The question of ending at a free configuration of the goal, if one is found and its middle is not free.
 
-    Of ends that keep the same distance from walls it is the one about which most of the tolerances is left.
+    A middle that is nearer to walls than ``planner.min_clearance`` is left for an end that is not. Of ends
+    that keep the same distance from walls it is the one about which most of the tolerances is left.
     """
     middle, random = within_limits(problem), np.random.default_rng(0)
-    if middle is problem and _free(problem, _ends(problem, random, 0.0), 0.0):
+    middles, least = _ends(problem, random, 0.0), problem.settings.min_clearance
+    free = middle is problem and len(_free(problem, middles, 0.0)) > 0
+    if free and _free(problem, middles, least):
         return None
     ends = _ends(problem, random, WITHIN)
     for distance in DISTANCES:
+        if free and distance < least:
+            return None
         asked = [ending_at(problem, end) for end in _free(problem, ends, distance)]
         if asked:
             return max(asked, key=lambda one: _left(one, problem))
