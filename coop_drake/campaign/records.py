@@ -33,9 +33,10 @@ class RunRecord:
         cell_margin: Smallest distance of the object's position to the boundary of its cell's region [m].
         wall_clearance: Smallest distance of any body to any wall [m].
         body_clearance: Smallest distance between bodies that must not touch [m].
-        budget_share: Largest share used of what the plan's budget states: of the tube's radius, or the
-            least distance of an axis to its funnel's bounds that it states over the one that was kept. NaN
-            for a plan without a budget, and where the run does not allow to tell [-].
+        budget_share: Largest share used of what the plan's budget states: of the departures of position,
+            velocity, axes and their rates from the nominal ones, or the least distance of an axis to its
+            funnel's bounds that it states over the one that was kept. NaN for a plan without a budget, and
+            where the run does not allow to tell [-].
         peak_force: Largest force of a base [N].
         peak_torque: Largest effort of a joint [N m or N]; NaN for a team without joints.
         held: How often the team was held at rest.

@@ -78,15 +78,16 @@ class LoopNominal(NamedTuple):
 
     Attributes:
         flow: What ``nominal_flow`` gives, of shape (0, 0) where p_G follows the measured position.
-        position: Largest speed of p_G [m/s], for how many periods a report is used [-] and the tube's radius
-            [m], shape (3,).
+        position: Largest speed of p_G [m/s], for how many periods a report is used [-], the radius of the
+            tube [m], and the largest departure of the velocity [m/s], shape (4,).
         axis_gains: K_a [1/s^2], zeta_a [1/s] and the lag of the nominal axes [s], shape (3,) or (0,).
         mountings: Those of all robots, see ``place_on_axes``, shape (M,).
         levels: Of the robots' monitors, see ``largest_departure``, shape (4,) or (0,).
         axis_alarms: Levels of all axes and of their rates in every cell, shape (C, 2, M) or (C, 2, 0).
         reserves: What must be left of the distances of all axes to their funnels' bounds, shape (M,) or (0,).
         distances: Least distances of (theta, q) to the bounds of their funnels that the budget states for
-            every cell, shape (C, 1 + n) or (0, 0) [rad or m].
+            every cell, then their largest departures and those of their rates, shape (3, C, 1 + n) or
+            (0, 0, 0) [rad or m, and per s].
     """
 
     flow: FloatArray

@@ -126,10 +126,10 @@ def nominal_of(transport: CompiledTransport, period: float) -> LoopNominal:
     nominal = transport.nominal
     if not nominal.position.size or budget is None:
         return nominal
-    speed, _, radius = nominal.position
+    speed, _, radius, rate = nominal.position
     periods = report_periods(budget.report_age, period)
     flow = _flow(gains.stiffness, gains.damping, period).copy()
-    return nominal._replace(flow=flow, position=np.array([speed, periods, radius]))
+    return nominal._replace(flow=flow, position=np.array([speed, periods, radius, rate]))
 
 
 @lru_cache(maxsize=32)

@@ -187,7 +187,10 @@ def _reach(tree: ComponentTree) -> FloatArray:
 def _nominal(plan: Plan, team: TeamPlant, knowledge: Sequence[RobotKnowledge]) -> LoopNominal:
     """Return the nominal motions; their flow and the age of reports follow from the control rate of a run."""
     none, tube, motion = np.empty(0), plan.tube, knowledge[0].axis_motion
-    distances = [one.tolerance.distance for one in plan.transitions if one.tolerance is not None]
+    stated = [one.tolerance for one in plan.transitions if one.tolerance is not None]
+    distances = [
+        [getattr(one, name) for one in stated] for name in ("distance", "departure", "rate_departure")
+    ]
     mountings = np.concatenate([base_chain(team, robot).mounting for robot in team.robots])
     monitored = [known.monitored for known in knowledge if known.monitored is not None]
     of_axes = [np.empty((len(plan.cells), 2, 0)), *(one.axis_alarms for one in monitored)]
@@ -196,11 +199,11 @@ def _nominal(plan: Plan, team: TeamPlant, knowledge: Sequence[RobotKnowledge]) -
         gains = np.array([motion.tracking.stiffness, motion.tracking.damping, motion.lag])
     return LoopNominal(
         np.empty((0, 0)),
-        none if tube is None else np.array([tube.speed, 0.0, tube.radius]),
+        none if tube is None else np.array([tube.speed, 0.0, tube.radius, tube.rate]),
         gains,
         mountings,
         monitored[0].levels if monitored else none,
         np.ascontiguousarray(np.concatenate(of_axes, axis=2)),
         np.concatenate([none, *(one.axis_reserve for one in monitored)]),
-        np.array(distances) if motion is not None else np.empty((0, 0)),
+        np.array(distances) if motion is not None else np.empty((0, 0, 0)),
     )

@@ -58,9 +58,9 @@ class RunOutcome:
         cell_margin: Distance of the object's position to the boundary of its cell's region [m].
         wall_clearance: Distance of any body to any wall [m].
         body_clearance: Distance between bodies that must not touch [m].
-        budget_share: Largest share used of what the plan's budget states: of the tube's radius, or the
-            least distance of an axis to its funnel's bounds over the one that it kept; NaN for a plan
-            without a budget [-].
+        budget_share: Largest share used of what the plan's budget states: of the departures of position,
+            velocity, axes and their rates from the nominal ones, or the least distance of an axis to its
+            funnel's bounds over the one that it kept; NaN for a plan without a budget [-].
         alarm_share: Largest measured departure from the nominal motion over its level; NaN for a plan without
             a budget [-].
         peak_force: Largest force of a base [N].

@@ -130,9 +130,7 @@ def watch(
     figures[SAMPLES], figures[CELL] = sample, cell
     _watch_cell(sample, cell, cells, plant, nominal, departures, memory, room, figures)
     watch_distances(z, plant, room.clearances, figures)
-    if nominal.flow.size:
-        led = memory.nominal[sample % memory.nominal.shape[0]]
-        _use(hypot(z[0] - led[0], z[1] - led[1]) / nominal.position[2], figures)
+    _watch_departures(sample, cell, z, team, plant, nominal, memory, figures)
     _watch_efforts(team, memory, figures)
     _watch_alarms(nominal, memory, figures)
     if cell + 1 == cells.rows.shape[0] and left_by_all(cell, memory):
@@ -164,7 +162,7 @@ def _watch_cell(
         if not margin > 0.0:
             end(figures, OUT_OF_FUNNEL, margin, i)
         if nominal.distances.size:
-            _use(nominal.distances[cell, i] / margin if margin > 0.0 else inf, figures)
+            _use(nominal.distances[0, cell, i] / margin if margin > 0.0 else inf, figures)
         lower, upper = cells.slices[0, cell, i], cells.slices[1, cell, i]
         margin = min(z[2 + i] - lower, upper - z[2 + i])
         if not margin > 0.0:
@@ -200,6 +198,26 @@ def watch_distances(z: FloatArray, plant: LoopPlant, last: Clearances, figures: 
         end(figures, AT_WALL, figures[WALL])
     if not figures[BODY] > 0.0:
         end(figures, AT_BODY, figures[BODY])
+
+
+@compiled
+def _watch_departures(
+    sample: int, cell: int, z: FloatArray, team: FusedTeam, plant: LoopPlant, nominal: LoopNominal,
+    memory: LoopMemory, figures: FloatArray,
+) -> None:  # fmt: skip
+    """Measure how far position, velocity, axes and their rates are from their nominal motions."""
+    if not nominal.flow.size:
+        return
+    led = memory.nominal[sample % memory.nominal.shape[0]]
+    vx, vy = memory.state[team.places[1, 0]], memory.state[team.places[1, 1]]
+    _use(hypot(z[0] - led[0], z[1] - led[1]) / nominal.position[2], figures)
+    _use(hypot(vx - led[2], vy - led[3]) / nominal.position[3], figures)
+    if nominal.distances.size:
+        axes = memory.axes[sample % memory.axes.shape[0]]
+        for i in range(z.size - 2):
+            row, rate = plant.axis_rows[0, i], memory.state[team.places[1, 2 + i]]
+            _use(abs(z[2 + i] - axes[0, row]) / nominal.distances[1, cell, i], figures)
+            _use(abs(rate - axes[1, row]) / nominal.distances[2, cell, i], figures)
 
 
 @compiled
