@@ -39,6 +39,7 @@ from benchmarks.planner.teams import team_tasks
 from benchmarks.rejoining import rejoining_tasks
 from benchmarks.simulating import simulating_tasks
 from benchmarks.starting import starting_tasks
+from benchmarks.stops import stops_tasks
 from benchmarks.table import show
 from benchmarks.tasks import Task, chosen, worked
 from coop_drake.campaign.questions.ompl_peer import has_ompl
@@ -129,6 +130,7 @@ def _tasks(effort: Effort) -> list[Task]:
         *apart_tasks(),
         *rejoining_tasks(),
         *limp_tasks(),
+        *stops_tasks(),
         *campaign_tasks(),
     ]
 

@@ -53,9 +53,11 @@ class LimpExchange(DirectExchange):
         self._damping = [braking_damping(*base_inertia(own), len(own.joints)) for own in team.robots]
         self._still, self._failed, self._rests = Stillness(control_period(scenario)), False, False
 
-    def step(self, time: float, measured: Sequence[FloatArray]) -> list[FloatArray]:
+    def step(
+        self, time: float, measured: Sequence[FloatArray], stamps: Sequence[FloatArray] | None = None
+    ) -> list[FloatArray]:
         """See ``Exchange``."""
-        efforts = super().step(time, measured)
+        efforts = super().step(time, measured, stamps)
         self._failed = time >= self._fault
         if not self._failed:
             return efforts

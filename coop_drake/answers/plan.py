@@ -17,6 +17,7 @@ from coop_drake.answers.limits import Refusal, SpeedStatement
 from coop_drake.answers.position_tube import PositionTube
 from coop_drake.answers.proof import InfeasibilityProof
 from coop_drake.answers.region import Points, Region
+from coop_drake.answers.restart import Restart
 from coop_drake.answers.search_report import SearchReport
 from coop_drake.laws.gains import TransitionGains
 from coop_drake.typed_data import EXACT, NotNegative, Number, Positive, Vector
@@ -102,6 +103,8 @@ class Plan:
             budget.
         refused_by: Limits of the scenario that the plan breaks: it shows that a way exists, but cannot be
             carried out. Empty for a plan that can.
+        restart: From which rests a cell can be begun anew under the budget; null in a plan without one for
+            angles and joints.
     """
 
     problem: str = ""
@@ -119,6 +122,7 @@ class Plan:
     axis_tracking: AxisTracking | None = None
     alarms: Alarms | None = None
     refused_by: tuple[Refusal, ...] = ()
+    restart: Restart | None = None
 
     def governed(self, index: int) -> Polygon:
         """Return the region to which the governor keeps p_G in a cell: Q_i, or less where there is a tube."""

@@ -39,28 +39,50 @@ class DeployedController:
             governor.set_integral_value(governor.GetMyMutableContextFromRoot(root), p_WG)
         _prepare(self.delays, root)
 
-    def begin(
-        self, root: Context, cell: int, object_pose: FloatArray, joints: FloatArray, table: FloatArray
-    ) -> None:
-        """Set all states to those of a robot that begins a cell at rest.
+    def begin(self, root: Context, cell: int, object_pose: FloatArray, joints: FloatArray) -> None:
+        """Set all states to those of a robot that is at rest in a cell.
 
         Args:
             root: The context, of this Diagram alone, in which the inputs are set.
             cell: Index of the cell, which is also that of the input ``current_cell``.
             object_pose: Where the object rests, the same for all robots, (x, y, angle) in W.
             joints: Where the robot's own joints rest [rad or m].
-            table: The ``axis_table`` of the object's angle and these joints from now on, in this cell.
         """
         time = root.get_time()
         self.diagram.SetDefaultContext(root)
         root.SetTime(time)
-        self.controller.GetSubsystemByName("axis_ppc").set_table(cell, table)
         axes = np.array([object_pose[2], *joints])
         self._rest(root, "nominal_axes", axes)
-        self._rest(root, "axis_ppc", cell, axes)
         self._rest(root, "departure_monitor", object_pose[:2], axes, cell)
         self.keep_position(root, object_pose[:2])
+        self.command_axes(root, cell, np.zeros(1 + len(joints)))
+
+    def command_axes(self, root: Context, cell: int, jumps: FloatArray) -> None:
+        """Set what a switch to a cell leaves of the accelerations of the angle and of the joints.
+
+        Args:
+            root: The context, in which the cell is entered now.
+            cell: Index of the cell.
+            jumps: Shape (1 + n,) [rad/s^2 or m/s^2].
+        """
         _prepare(self.heard, root)
+        block = self.controller.GetSubsystemByName("axis_ppc")
+        state = block.GetMyMutableContextFromRoot(root).get_mutable_discrete_state_vector()
+        state.SetFromVector([cell, *jumps])
+
+    def nominal_axes(self, root: Context) -> FloatArray | None:
+        """Return nominal angle and joints, then their rates, shape (2, 1 + n); None where there are none."""
+        if not self.controller.HasSubsystemNamed("nominal_axes"):
+            return None
+        block = self.controller.GetSubsystemByName("nominal_axes")
+        return block.states_of(block.GetMyContextFromRoot(root))[:2].copy()
+
+    def nominal_position(self, root: Context) -> FloatArray | None:
+        """Return the object's nominal position, shape (2,) [m]; None where there is none."""
+        if not self.controller.HasSubsystemNamed("nominal_governor"):
+            return None
+        context = self.controller.GetSubsystemByName("nominal_governor").GetMyContextFromRoot(root)
+        return np.array(context.get_discrete_state_vector().value()[:2])
 
     def keep_position(self, root: Context, position: FloatArray) -> None:
         """Set p_G, and where it has one its nominal motion, to rest at a position, shape (2,) [m]."""
@@ -97,6 +119,8 @@ class Body:
     input   ``effort_command``       3 + n     what its controller asks for, held between samples
     output  ``measured_object_pose`` 3         as the controller gets it
     output  ``measured_robot_state`` 2 (3 + n) as the controller gets it
+    output  ``object_pose_stamp``    1         when the pose was measured that the controller gets [s]
+    output  ``robot_state_stamp``    1         when the state was measured that the controller gets [s]
     output  ``robot_effort``         3 + n     what the actuators give
     ======= ======================== ========= ==========================================================
 
@@ -124,7 +148,7 @@ def build_body(deployment: Deployment, robot: int, name: str, joints: int) -> Bo
     for entry in _MEASURED:
         elements = {f"measured_{entry}": [(0, i) for i in range(sizes[entry])]}
         given = builder.AddNamedSystem(f"given_{entry}", build_selector({entry: sizes[entry]}, elements))
-        wrapping.measure(given.get_input_port(0))
+        builder.ExportOutput(wrapping.measure_stamped(given.get_input_port(0)), f"{entry}_stamp")
         builder.ExportOutput(given.get_output_port(0), f"measured_{entry}")
     command = builder.AddNamedSystem("effort_command", PassThrough(3 + joints))
     builder.ExportInput(command.get_input_port(), "effort_command")

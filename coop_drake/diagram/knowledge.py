@@ -72,6 +72,7 @@ def robot_knowledge(
             goal=arrival_goal(scenario, plan, robot.q_slice),
             observer_gains=observer_gains(scenario.command_age) if control.observer else None,
             motion=_motion(scenario, plan, robot.name, 0 if control.predictor else delay),
+            measured_age=deployment.whole_delay,
             axis_motion=_axis_motion(scenario, plan, team, robot, 0 if control.predictor else delay),
             monitored=_monitored(scenario, plan, team, robot, delay),
         )

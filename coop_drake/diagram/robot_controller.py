@@ -75,6 +75,7 @@ class RobotKnowledge:
         axis_motion: That of the object's angle and of its joints; None where their law acts on what is
             measured.
         monitored: What its monitor of departures needs; None where there is no nominal motion.
+        measured_age: Age of its measurements, in whole periods [s].
     """
 
     robot: RobotPlant
@@ -94,6 +95,7 @@ class RobotKnowledge:
     motion: NominalMotion | None = None
     axis_motion: AxisMotion | None = None
     monitored: MonitoredRobot | None = None
+    measured_age: float = 0.0
 
     @property
     def p_LE(self) -> FloatArray:

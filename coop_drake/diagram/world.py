@@ -96,6 +96,8 @@ def build_world(scenario: Scenario, plan: Plan, exchange: Exchange) -> World:
                 link.GetInputPort(f"robot_{k}_object_pose"),
             ),
             (diagram.GetOutputPort("measured_robot_state"), link.GetInputPort(f"robot_{k}_state")),
+            (diagram.GetOutputPort("object_pose_stamp"), link.GetInputPort(f"robot_{k}_pose_stamp")),
+            (diagram.GetOutputPort("robot_state_stamp"), link.GetInputPort(f"robot_{k}_state_stamp")),
             (
                 link.GetOutputPort(f"robot_{k}_effort_command"),
                 diagram.GetInputPort("effort_command"),

@@ -9,11 +9,15 @@ import numpy as np
 from pydrake.systems.framework import DiagramBuilder, InputPort, LeafSystem, OutputPort
 from pydrake.systems.primitives import (
     AffineSystem,
+    Demultiplexer,
     DiscreteTimeDelay,
     FirstOrderLowPassFilter,
     Gain,
+    Multiplexer,
+    TrajectorySource,
     ZeroOrderHold,
 )
+from pydrake.trajectories import PiecewisePolynomial
 
 from coop_drake.diagram.radio import build_radio, seed_of
 from coop_drake.laws.channels import NOTHING
@@ -35,6 +39,9 @@ _STRONGEST = 1e5
 """Limit of every effort where the scenario gives none [N, N m]. A controller outside its funnel may ask for
 any effort; without a limit the plant's state would overflow, which ends the process instead of the run."""
 
+_CLOCK = PiecewisePolynomial.FirstOrderHold([0.0, 1e6], [[0.0, 1e6]])
+"""The time as a function of itself [s]."""
+
 _KILO = 1e3
 """Unit of the lagging efforts [N, N m]. The integrator's error control compares states of all units with one
 number; efforts in newtons would ask for a thousandth of a newton, and for very short steps."""
@@ -51,17 +58,40 @@ class Wrapping:
 
     def measure(self, entry: InputPort) -> None:
         """Export an input of the controller with its constant errors, noise, delay and losses."""
-        name, size, period = entry.get_name(), entry.size(), self._deployment.period
-        measurements = self._deployment.measurements
-        blocks = [(f"{name}_biased", _distortion(self._own, name, size))]
+        name, size = entry.get_name(), entry.size()
+        self._lead(entry, self._sensed(name, size) + self._carried(name, size))
+
+    def measure_stamped(self, entry: InputPort) -> OutputPort:
+        """Do the same, and return when what the controller gets was measured [s].
+
+        The time of the measurement goes with it through all that delays or loses it.
+        """
+        name, size = entry.get_name(), entry.size()
+        joined, parted = Multiplexer([size, 1]), Demultiplexer([size, 1])
+        carried = [(f"{name}_stamped", joined), *self._carried(name, 1 + size), (f"{name}_parted", parted)]
+        self._lead(entry, self._sensed(name, size) + carried)
+        clock = self._builder.AddNamedSystem(f"{name}_clock", TrajectorySource(_CLOCK))
+        self._builder.Connect(clock.get_output_port(0), joined.get_input_port(1))
+        return parted.get_output_port(1)
+
+    def _sensed(self, name: str, size: int) -> list[tuple[str, LeafSystem]]:
+        """Return the blocks of a measurement's errors."""
+        period, blocks = self._deployment.period, [(f"{name}_biased", _distortion(self._own, name, size))]
         if period is not None:
             blocks.append((f"{name}_measured", self._noise(name, size, period)))
-            delays = self._delays(size, whole_periods(measurements.delay, period))
-            blocks.extend((f"{name}_delay{i or ''}", delay) for i, delay in enumerate(delays))
-            blocks.append((f"{name}_received", self._losses(name, size, period)))
-        added = [(label, block) for label, block in blocks if block is not None]
-        self.delays.extend(block for _, block in added if isinstance(block, Holding))
-        self._lead(entry, added)
+        return [(label, block) for label, block in blocks if block is not None]
+
+    def _carried(self, name: str, size: int) -> list[tuple[str, LeafSystem]]:
+        """Return the blocks that delay or lose a measurement on its way."""
+        measurements, period = self._deployment.measurements, self._deployment.period
+        if period is None:
+            return []
+        delays = self._delays(size, whole_periods(measurements.delay, period))
+        blocks = [*((f"{name}_delay{i or ''}", delay) for i, delay in enumerate(delays))]
+        if (lossy := self._losses(name, size, period)) is not None:
+            blocks.append((f"{name}_received", lossy))
+        self.delays.extend(block for _, block in blocks if isinstance(block, Holding))
+        return blocks
 
     def hear(self, entry: InputPort) -> None:
         """Export the input of the current cell, which a robot may hear late and time by a wrong clock."""

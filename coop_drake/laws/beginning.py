@@ -1,55 +1,84 @@
-"""How a team begins its current cell anew where its drives have brought it to rest.
+"""How a team begins its current cell anew from rest: slowly, on a straight way to the middle of its goals.
 
-An axis that was braked may rest outside its slice, or so near to its end that V would be too large. Then its
-funnel begins wider than the slice, with the axis inside, and closes to the goal interval like every other.
-Meanwhile p_G waits where the object rests for ``POSITION_WAITS``: the team has come from its slices on nearly
-the same way, which was free, and goes back on it before anything else moves.
+Every axis goes from where it rests to the middle of its goal interval, in the same time for all axes of the
+team, by
+
+    x(t) = x_0 + (x_1 - x_0) s(t / S),   s(r) = 10 r^3 - 15 r^4 + 6 r^5,
+
+whose largest rate is 1.875 |x_1 - x_0| / S and whose largest acceleration 5.774 |x_1 - x_0| / S^2. Meanwhile
+the object's position rests, or returns to its cell in the same way where it is outside. Then the cell's law
+takes over: its funnels are closed about the axes, and p_G goes to the target.
+
+A cell is convex in its axes: from a rest inside the slices the way lies inside. What the plan states about
+such rests is in ``answers/restart.py``.
 """
 
 from __future__ import annotations
 
-from coop_drake.compiled import compiled
-from coop_drake.laws.axis_table import ENERGY_BOUND, SLICE_LOWER, SLICE_UPPER, track_row
-from coop_drake.laws.readiness import funnel_margin
+from math import ceil, sqrt
+
+from coop_drake.laws.axis_table import DECAY_RATE, FADING_TIME, RAMP_RATE
+from coop_drake.laws.funnels import CLOSING
 from coop_drake.tree.pose import FloatArray
 
-POSITION_WAITS = 1.0
-"""Time for which p_G waits [s]: funnels of plans close to their goal intervals within about half of it."""
+RATE = 0.4
+"""Largest rate of an axis on the way, and largest speed of the object [rad/s or m/s]: a fifth to a tenth of
+what funnels ask for, so that rates and errors of masses cause little."""
 
-_FIRST_REACH = 0.02
-"""Smallest distance of an axis to the end of its wider slice that is tried, over the slice's width [-]."""
+ACCELERATION = 1.0
+"""Largest acceleration of an axis on the way [rad/s^2 or m/s^2]."""
 
-_LARGEST_REACH = 1.0
-"""Largest one [-]: a whole slice away no certificate says anything about what is free."""
+USED = 0.9
+"""Share of both for which the time is chosen [-]: the rest is for what a motion makes up for on its way."""
 
-_STEP = 1.3
-"""Factor between one that is tried and the next [-]."""
+PULL = (100.0, 20.0)
+"""Stiffness [1/s^2] and damping [1/s] with which an axis is kept on the way."""
+
+LONGEST_RETURN = 0.3
+"""Longest way on which an object outside its cell returns [m]: braked teams coast by less."""
+
+WIDEST_RETURN = 1.0
+"""Longest way of an axis to its slice, over the slice's width [-]: farther away no certificate says anything
+about what is free."""
+
+RAMPED = 6.0
+"""mu t from which on the gain k1 counts as ramped in [-], as in the plan's budget."""
 
 
-@compiled
-def widen_slice(row: FloatArray, position: float, wide: FloatArray) -> float:
-    """Write a row whose slice is just so wide that an axis at rest may begin it; return the margin of its V.
-
-    The margin is negative where no slice that is tried is wide enough, or the axis rests further outside its
-    slice than ``_LARGEST_REACH`` of the width.
+def slow_samples(distance: float, period: float, share: float = 1.0) -> int:
+    """Return how many periods a way takes [-].
 
     Args:
-        row: The axis in the cell, a row of an ``axis_table``.
-        position: x, where it rests [rad or m].
-        wide: Receives the row, shape (``LAW_COLUMNS``,).
+        distance: Largest distance of an axis, or of the object [rad or m].
+        period: T [s].
+        share: Share of rate and acceleration that the plan allows [-].
     """
-    wide[:] = row
-    lower, upper = row[SLICE_LOWER], row[SLICE_UPPER]
-    width, reach = upper - lower, _FIRST_REACH
-    outside = max(lower - position, position - upper)
-    if outside > _LARGEST_REACH * width:
-        return float(-outside / width)
-    margin = -1.0
-    if outside < 0.0:
-        margin = funnel_margin(track_row(wide, 0.0, position, 0.0)[1], row[ENERGY_BOUND])
-    while margin < 0.0 and reach <= _LARGEST_REACH:
-        wide[SLICE_LOWER] = min(lower, position - reach * width)
-        wide[SLICE_UPPER] = max(upper, position + reach * width)
-        margin = funnel_margin(track_row(wide, 0.0, position, 0.0)[1], row[ENERGY_BOUND])
-        reach *= _STEP
-    return float(margin)
+    used = USED * share
+    time = max(1.875 * distance / (used * RATE), sqrt(5.774 * distance / (used * ACCELERATION)))
+    return ceil(time / period) + 1
+
+
+def slow_motion(ends: FloatArray, time: float, duration: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return x, x' and x'' at a time of the way, each of shape (m,).
+
+    Args:
+        ends: x_0 and x_1, shape (2, m) [rad or m].
+        time: t, any; before 0 and after S all rest [s].
+        duration: S [s].
+    """
+    r, way = min(max(time / duration, 0.0), 1.0), ends[1] - ends[0]
+    share = r**3 * (10.0 - 15.0 * r + 6.0 * r * r)
+    rate = 30.0 * r * r * (1.0 - r) ** 2 / duration
+    acceleration = 60.0 * r * (1.0 - r) * (1.0 - 2.0 * r) / duration**2
+    return ends[0] + share * way, rate * way, acceleration * way
+
+
+def closed_after(table: FloatArray) -> float:
+    """Return the time after which all funnels of a cell are closed, gains ramped and jumps faded [s].
+
+    Args:
+        table: The axes in the cell, an ``axis_table``.
+    """
+    closed = (CLOSING / table[:, DECAY_RATE]).max()
+    ramped = max((RAMPED / rate for rate in table[:, RAMP_RATE] if rate > 0.0), default=0.0)
+    return float(max(closed, ramped, table[:, FADING_TIME].max()))

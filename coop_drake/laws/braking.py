@@ -1,4 +1,15 @@
-"""How a robot stops by itself when its team is not complete: every effort works against its own rate."""
+"""How a robot stops by itself when its team is not complete: every effort works against its own rate.
+
+Where a robot has told its drives a rest, they pull towards it, too, z being the robot's own coordinates:
+
+    effort = -D (z' + kappa (z - z_rest)).
+
+Damper and spring take energy out of the team whatever its masses are, for -D z' has negative power and the
+spring has a potential. All robots follow the same nominal motion and so name rests that fit each other: the
+team comes to rest where this motion was, which is inside its cell.
+"""
+
+from math import pi, tau
 
 import numpy as np
 
@@ -17,6 +28,11 @@ JOINT_DAMPING = 1.0
 measurements as old; lighter ones need fresher measurements."""
 
 
+RETURN_RATE = 4.0
+"""kappa [1/s]: a team of bases of 6 kg with their load, whose damping is 12 /s, overshoots its rest by less
+than it would coast."""
+
+
 def braking_damping(mass: float, inertia: float, joints: int) -> FloatArray:
     """Return base wrench and joint torques for each unit of the rates, shape (3 + n,).
 
@@ -28,14 +44,19 @@ def braking_damping(mass: float, inertia: float, joints: int) -> FloatArray:
     return np.array([BASE_RATE * mass, BASE_RATE * mass, TURN_RATE * inertia, *[JOINT_DAMPING] * joints])
 
 
-def braking_effort(state: FloatArray, damping: FloatArray) -> FloatArray:
+def braking_effort(state: FloatArray, damping: FloatArray, rest: FloatArray | None = None) -> FloatArray:
     """Return base wrench and joint torques that brake a robot, shape (3 + n,) [N, N m].
 
-    Its power is negative whatever the others do, but for the age of measurements, so that a team in which
-    all robots brake comes to rest.
+    A team in which all robots brake loses energy, but for the age of measurements, and comes to rest.
 
     Args:
         state: z_k and its rate, shape (2 (3 + n),).
-        damping: From :func:`braking_damping`.
+        damping: D, from :func:`braking_damping`.
+        rest: Where it shall come to rest, z_k of shape (3 + n,); None where that is not known.
     """
-    return -damping * state[len(state) // 2 :]
+    half = len(state) // 2
+    if rest is None:
+        return -damping * state[half:]
+    away = state[:half] - rest
+    away[2:] = (away[2:] + pi) % tau - pi  # a rest is never half a turn away; sensors may show any turn
+    return -damping * (state[half:] + RETURN_RATE * away)

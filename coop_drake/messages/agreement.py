@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import NamedTuple
 
-TAKEN, OTHER_SCENARIO, OTHER_PLAN, OTHER_KEY = 1, 2, 3, 4
+TAKEN, OTHER_SCENARIO, OTHER_PLAN, OTHER_KEY, OTHER_VERSION = 1, 2, 3, 4, 5
 """Reasons of ``TurnedAway``."""
 
 REASONS = {
@@ -13,6 +13,7 @@ REASONS = {
     OTHER_SCENARIO: "it has another scenario",
     OTHER_PLAN: "it has another plan",
     OTHER_KEY: "its address book has another key for this name",
+    OTHER_VERSION: "it speaks another version of the protocol",
 }
 """The reasons in words, said by the one that is turned away."""
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import zmq
 
-from coop_drake.messages.agreement import ANY_QUESTION, REASONS, Question, Tap
+from coop_drake.messages.agreement import ANY_QUESTION, OTHER_VERSION, REASONS, Question, Tap
 from coop_drake.messages.codec import OPENING, decode, encode, header_of
 from coop_drake.messages.incoming import Incoming
 from coop_drake.messages.keys import KeyPair
@@ -181,6 +181,8 @@ class MessageClient:
             self.incoming.take(header.sequence)
         except RefusedError as refused:
             self.refusals.add(refused.reason)
+            if refused.reason is Reason.VERSION:
+                self.trouble = REASONS[OTHER_VERSION]
             return None
         self.heard = monotonic()
         return message

@@ -25,7 +25,7 @@ from coop_drake.messages.wire import KINDS, MESSAGES, MOST_ITEMS, Wire
 MAGIC = 0xCD0D
 """Stands in every message that opens a session."""
 
-VERSION = 3
+VERSION = 4
 """Version of the schema; grows when a message of the same bytes would mean something else."""
 
 OPENING = frozenset(KINDS[cls].code for cls in (Hello, Welcome, TurnedAway))
@@ -147,6 +147,26 @@ def _read_number(data: bytes, start: int) -> tuple[int, int]:
                 break  # Fewer bytes would do, or none: a number has one form alone.
             return number, start + k + 1
     raise RefusedError(Reason.LENGTH)
+
+
+def turned_away_by_version(data: bytes, reason: int, sender: int) -> bytes | None:
+    """Return the answer to a ``Hello`` of another version, in that version; None where it is no ``Hello``.
+
+    The headers of messages that open a session and the whole of ``TurnedAway`` are the same in all versions,
+    and every ``Hello`` begins with the nonce.
+
+    Args:
+        data: What came.
+        reason: For ``TurnedAway``.
+        sender: Who answers.
+    """
+    size = OPENING_HEADER.size
+    if len(data) < size + 4 or data[0] != KINDS[Hello].code:
+        return None
+    nonce = int.from_bytes(data[size : size + 4], "little")
+    answer = bytearray(encode(TurnedAway(nonce, reason), sender, 0, 0))
+    answer[3] = data[3]
+    return bytes(answer)
 
 
 def header_of(data: bytes) -> Header:

@@ -18,6 +18,7 @@ class Reason(Enum):
     SESSION = "no session, or one that is over"
     SEQUENCE = "its number has been passed: repeated or reordered"
     VALUE = "a value that its field does not allow"
+    STAMP = "an effort that rests on older measurements than drives may use, or on ones of the future"
     FLOOD = "its sender sends too much"
     HANDSHAKE = "a connection that does not speak as it must, or has no allowed key"
 

@@ -13,6 +13,7 @@ MOST_ROBOTS = 64
 """Largest number of robots of a team."""
 
 Pose = Annotated[tuple[float, ...], Wire("d", "m, m, rad", listed=True)]
+Coordinates = Annotated[tuple[float, ...], Wire("d", "m, rad", listed=True)]
 State = Annotated[tuple[float, ...], Wire("d", "m, rad, m/s, rad/s", listed=True)]
 Efforts = Annotated[tuple[float, ...], Wire("d", "N, N m", listed=True)]
 Values = Annotated[tuple[float, ...], Wire("d", listed=True, finite=False)]
@@ -81,12 +82,14 @@ class Sample(NamedTuple):
 
     Attributes:
         number: Number of the sample.
-        time: Simulated time.
+        time: What the robot's clock shows at the sample.
         step: Whether the robot updates its state now, after it has shown its outputs for the log; else it
             only shows them.
         stopped: Whether the line of the emergency stop is open, so that the drives of all robots brake.
         team_messages: In lock-step, the robot computes once it has so many messages of the supervisor in
             their session.
+        pose_stamp: When the pose was measured, in the world's time; not when it was sent.
+        state_stamp: When the state was measured, likewise.
         object_pose: Pose (x, y, angle) of the object's frame L in W, the angle in any turn.
         robot_state: The robot's own (z_k, z_k'), z_k = (x, y, yaw of Bk, q_k), in W, joints without limits in
             any turn.
@@ -97,6 +100,8 @@ class Sample(NamedTuple):
     step: Flag
     stopped: Flag
     team_messages: Number
+    pose_stamp: Seconds
+    state_stamp: Seconds
     object_pose: Pose
     robot_state: State
 
@@ -126,17 +131,23 @@ class Effort(NamedTuple):
 
     Attributes:
         number: Number of the sample that it was computed from.
+        stamp: The older of the stamps of the measurements that it rests on.
         team_messages: How many messages this robot has sent to the supervisor in this session.
         state: State of the process: 0: it follows the plan; 1: it holds; 2: its drives brake, and it waits to
             begin its cell anew; 3: it does not know the current cell; 4: it rests where it cannot begin its
-            cell anew.
+            cell anew; 5: it returns slowly to its cell, on a way that no plan has proved free; 6: its
+            measurements are older than the plan allows, or have stamps that cannot be.
         efforts: Base wrench and joint torques, shape (3 + n_k,).
+        rest: Where the drives bring the robot to rest when the line is opened, its own z_k, shape (3 + n_k,);
+            empty where it follows no nominal motion.
     """
 
     number: Number
+    stamp: Seconds
     team_messages: Number
     state: Small
     efforts: Efforts
+    rest: Coordinates = ()
 
 
 @message(33, "efforts", "robot")
@@ -263,10 +274,16 @@ class AtRest(NamedTuple):
 
     Attributes:
         sample: Number of the sample.
-        object_pose: Pose (x, y, angle) of the object's frame L in W as this robot measures it at rest.
+        cells: Indices of the present cell and of its neighbours that it can begin anew from there with all
+            that the plan promises; none in a plan that promises nothing.
+        needed: For how many samples it goes slowly until a cell's law takes over, the most of these cells.
+        object_pose: Pose (x, y, angle) of the object's frame L in W as this robot measures it, the mean over
+            the time in which it was seen to rest.
     """
 
     sample: Number
+    cells: Numbers
+    needed: Number
     object_pose: Pose
 
 
@@ -274,15 +291,17 @@ class AtRest(NamedTuple):
 class Begin(NamedTuple):
     """All robots begin the current cell anew from rest, at the same sample and from the same pose.
 
-    Each of them sets p_G and its reference of the object's angle to this pose, and its joints' references to
-    its own joints.
+    Each of them goes slowly from this pose and its own joints to the middle of the goal intervals. Then the
+    cell's law takes over, in all of them at the same sample.
 
     Attributes:
         cell: Index of the cell.
         sample: Number of the sample at which they begin.
-        object_pose: Pose (x, y, angle) of the object's frame L in W.
+        slow: For how many samples they go slowly, the most that one of them needs.
+        object_pose: Pose (x, y, angle) of the object's frame L in W, the mean of what all have reported.
     """
 
     cell: Index
     sample: Number
+    slow: Number
     object_pose: Pose

@@ -15,11 +15,12 @@ from coop_drake.messages.agreement import (
     OTHER_KEY,
     OTHER_PLAN,
     OTHER_SCENARIO,
+    OTHER_VERSION,
     TAKEN,
     Question,
     Tap,
 )
-from coop_drake.messages.codec import Header, decode, encode, header_of
+from coop_drake.messages.codec import Header, decode, encode, header_of, turned_away_by_version
 from coop_drake.messages.doorkeeper import Doorkeeper
 from coop_drake.messages.incoming import RATE
 from coop_drake.messages.keys import KeyPair
@@ -186,6 +187,8 @@ class MessageServer:
             peer.incoming.take(header.sequence)
         except RefusedError as refused:
             self.refusals.add(refused.reason)
+            if refused.reason is Reason.VERSION:
+                self._answer_other_version(route, data)
             return None
         peer.heard = monotonic()
         return peer.sender, message
@@ -217,6 +220,13 @@ class MessageServer:
         self._put(peer, route, encode(answer, self._sender, 0, 0))
         if reason == OTHER_KEY:
             raise RefusedError(Reason.SENDER)
+
+    def _answer_other_version(self, route: bytes, data: bytes) -> None:
+        """Tell a process that speaks another version why it is turned away, in words of its own version."""
+        answer = turned_away_by_version(data, OTHER_VERSION, self._sender)
+        known = self.peers.get(data[4]) if len(data) > 4 else None
+        if answer is not None and known is not None:
+            self._put(known, route, answer)
 
     def _offer(self, peer: Peer, route: bytes) -> int:
         """Draw a session for a connection and forget the connections whose offers have lapsed."""

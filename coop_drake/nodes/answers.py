@@ -18,6 +18,7 @@ def question(
     time: float,
     measured: Sequence[FloatArray],
     counts: Mapping[int, Any],
+    stamps: Sequence[FloatArray],
     *,
     step: bool,
     stopped: bool,
@@ -30,6 +31,7 @@ def question(
         time: What its clock shows [s].
         measured: What every robot measures: its own state, then the object's pose.
         counts: How many messages each process has sent to the team, or the supervisor to each robot.
+        stamps: When every robot's pose and state were measured [s].
         step: Whether it updates its state.
         stopped: Whether the drives brake.
     """
@@ -37,7 +39,8 @@ def question(
         sent = tuple(counts.get(k, 0) for k in range(len(measured)))
         return Tick(sample, time, step, stopped, sent)
     told, own = counts.get(SUPERVISOR), measured[index]
-    return Sample(sample, time, step, stopped, told[index] if told else 0, tuple(own[-3:]), tuple(own[:-3]))
+    heard, (pose, state) = told[index] if told else 0, map(float, stamps[index])
+    return Sample(sample, time, step, stopped, heard, pose, state, tuple(own[-3:]), tuple(own[:-3]))
 
 
 def fits(sender: int, message: Any, sizes: Sequence[int], known: Mapping[tuple[int, type], Any]) -> bool:
@@ -52,7 +55,9 @@ def fits(sender: int, message: Any, sizes: Sequence[int], known: Mapping[tuple[i
     if isinstance(message, Status):
         return len(message.team_messages) == len(sizes) and len(message.causes) in (0, 1 + len(sizes))
     if isinstance(message, Effort):
-        return len(message.efforts) == sizes[sender] and bool(message.state < len(STATES))
+        size = sizes[sender]
+        fitting = len(message.efforts) == size and len(message.rest) in (0, size)
+        return fitting and bool(message.state < len(STATES))
     before = known.get((sender, Telemetry))
     return (before is None or len(before.values) == len(message.values)) and bool(message.state < len(STATES))
 

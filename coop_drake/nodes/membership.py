@@ -8,7 +8,7 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from coop_drake.messages import SUPERVISOR, name_of
-from coop_drake.nodes.states import ASKS, OUTSIDE, STANDS
+from coop_drake.nodes.states import ASKS, LATE, OUTSIDE, STANDS
 
 TOLERATED = 0.02
 """How long drives hold the last effort of a robot that gives no other, where the plan has no budget [s]:
@@ -16,6 +16,12 @@ shipped transports lose nothing by it."""
 
 _ROUNDING = 1e-6
 """Differences of times that are no difference [s]."""
+
+_STRANDED = {
+    OUTSIDE: "cannot begin the current cell anew from there",
+    LATE: "cannot go on: measurements are older than the plan allows, or have stamps that cannot be",
+}
+"""Why a team that rests cannot go on, by the state of its robots."""
 
 PATIENT_AT_REST = 0.5
 """A robot that rests where it cannot begin its cell anew says so for this long before the run ends [s]:
@@ -31,12 +37,15 @@ class Stop:
         since: When the line was opened [s].
         rested: When the team rested, None where it did not [s].
         resumed: When it went on, None where it did not [s].
+        certified: Whether it began its cell anew from a rest for which the plan holds; else it returned
+            slowly, on a way that no plan has proved free.
     """
 
     cause: str
     since: float
     rested: float | None = None
     resumed: float | None = None
+    certified: bool = False
 
 
 class Membership:
@@ -105,7 +114,7 @@ class Membership:
             rests: Whether the team rests.
         """
         late = [k for k, since in self.missing.items() if k != SUPERVISOR and self.too_long(since, time)]
-        waiting = [k for k, state in states.items() if state in (STANDS, ASKS)]
+        waiting = [k for k, state in states.items() if state in (STANDS, ASKS, LATE)]
         if not self.stopped and (late or waiting):
             names = ", ".join(name_of(k) for k in sorted(late or waiting))
             self.stopped = True
@@ -114,18 +123,19 @@ class Membership:
         if self.stopped and rests and self.stops[-1].rested is None:
             self.stops[-1].rested = time
         if self._stranded(time, states):
-            outside = sorted(k for k, state in states.items() if state == OUTSIDE)
-            names = " and ".join(name_of(k) for k in outside)
-            self._end(f"{names} cannot begin the current cell anew from there")
+            why = LATE if LATE in states.values() else OUTSIDE
+            names = " and ".join(name_of(k) for k in sorted(states) if states[k] == why)
+            self._end(f"{names} {_STRANDED[why]}")
         if not (self.missing and rests):
             self._deadline = None
         elif self.timed_out():
             self.give_up()
 
-    def close_line(self, time: float) -> None:
-        """All robots follow the plan again."""
-        self.stopped, self.stops[-1].resumed = False, time
-        self._tell(f"the team goes on at t = {time:.6g} s")
+    def close_line(self, time: float, *, certified: bool) -> None:
+        """All robots go on."""
+        self.stopped, self.stops[-1].resumed, self.stops[-1].certified = False, time, certified
+        how = "" if certified else ", and returns slowly to its cell on a way that no plan has proved free"
+        self._tell(f"the team goes on at t = {time:.6g} s{how}")
 
     def timed_out(self) -> bool:
         """Whether a team at rest has waited long enough, or waits for processes that do not come back."""
@@ -153,7 +163,7 @@ class Membership:
     def _stranded(self, time: float, states: Mapping[int, int]) -> bool:
         rested = self.stops[-1].rested if self.stopped else None
         late = rested is not None and time - rested > PATIENT_AT_REST
-        return late and not self.missing and OUTSIDE in states.values()
+        return late and not self.missing and any(state in _STRANDED for state in states.values())
 
     def _missing_words(self, index: int) -> str:
         return f"{name_of(index)} has not answered since t = {self.missing[index]:.6g} s"

@@ -33,7 +33,7 @@ class RobotServer(Server):
         self._node, self._end, self._session = node, end, end.team.sessions
         self._placed, self._placing = 0, -inf
         self._stepped: int | None = None
-        self._measured = np.zeros(0)
+        self._measured, self._stamps = np.zeros(0), (0.0, 0.0)
 
     def _receive(self, sender: int, message: Any) -> None:
         if self._end.team.sessions != self._session:
@@ -74,7 +74,9 @@ class RobotServer(Server):
             effort, said = self._steps(question, measured)
             for message in said:
                 team.send(message)
-            self._end.efforts.send(Effort(number, self._sent, node.state, tuple(effort)))
+            rest = () if node.rest is None else tuple(node.rest)
+            stamp = min(question.pose_stamp, question.state_stamp)
+            self._end.efforts.send(Effort(number, stamp, self._sent, node.state, tuple(effort), rest))
         # What the log shows comes last: then the world knows that there is no effort if none has come.
         refused = self._end.refusals.total
         self._end.efforts.send(Telemetry(number, time, self._sent, node.state, refused, shown))
@@ -86,10 +88,11 @@ class RobotServer(Server):
         missed = 0 if self._stepped is None or question.stopped else question.number - self._stepped - 1
         for late in range(missed, 0, -1):
             time, number = question.time - late * self._node.period, question.number - late
-            said += self._node.step(time, self._measured, sample=number)[1]
+            said += self._node.step(time, self._measured, sample=number, stamps=self._stamps)[1]
         self._stepped, self._measured = question.number, measured
+        self._stamps = question.pose_stamp, question.state_stamp
         effort, new = self._node.step(
-            question.time, measured, sample=question.number, stopped=question.stopped
+            question.time, measured, sample=question.number, stopped=question.stopped, stamps=self._stamps
         )
         return effort, said + new
 

@@ -26,12 +26,15 @@ from coop_drake.nodes.answers import fits, process_facts, question
 from coop_drake.nodes.membership import TOLERATED, Membership
 from coop_drake.nodes.pacing import Pacing
 from coop_drake.nodes.serving import TURN
-from coop_drake.nodes.states import ASKS, FOLLOWS, HOLDS, REJOIN
+from coop_drake.nodes.states import ASKS, FOLLOWS, MOVES, REJOIN, RETURNS
 from coop_drake.nodes.stillness import Stillness
 from coop_drake.tree.pose import FloatArray
 
 PATIENCE = 5.0
 """How long a process may take for an answer in lock-step before the run goes on without it [s]."""
+
+_ROUNDING = 1e-6
+"""Differences of times that are no difference [s]."""
 
 _REHEARSALS = 20
 """How often everybody is asked what it would log before the first sample by the wall clock [-]: the first
@@ -59,6 +62,8 @@ class SampleExchange:
         links: Period of the samples, and faults of the robots' clocks.
         pacing: Keeps the pace of the wall clock; None for lock-step, in which every sample waits.
         tolerated: How long drives hold the last effort of a robot that gives no other [s].
+        oldest: Largest age that measurements on which an effort rests may have at its sample [s]; drives do
+            not take any other.
         gone: Returns the processes that are known to have ended.
         revive: Starts a process again that has ended; returns whether it did.
         patience: How long a process may take for an answer in lock-step [s].
@@ -80,6 +85,7 @@ class SampleExchange:
         *,
         pacing: Pacing | None = None,
         tolerated: float = TOLERATED,
+        oldest: float = inf,
         gone: Callable[[], Collection[int]] = tuple,
         revive: Callable[[int], bool] = lambda index: False,
         patience: float = PATIENCE,
@@ -89,15 +95,16 @@ class SampleExchange:
     ) -> None:
         self._end, self._patience, self._before, self._pacing = end, patience, before, pacing
         self._everyone, self._period = [*range(robots), SUPERVISOR], links.period
-        self._clock = links.faults.clock
+        self._clock, self._oldest = links.faults.clock, oldest + _ROUNDING
         self.membership = Membership(tolerated=tolerated, rejoin=rejoin, gone=gone, revive=revive, tell=tell)
         self.damping: Sequence[FloatArray] = ()
         self.sample, self._still = 0, Stillness(links.period)
         self._last: dict[tuple[int, type], Any] = {}
         self._states = dict[int, int]()
-        self._counts = dict[int, Any]()
+        self._counts, self._rests = dict[int, Any](), dict[int, FloatArray]()
         self._asked: dict[int, tuple[float, float]] = {}
         self._sizes: list[int] = []
+        self._stamps: Sequence[FloatArray] = ()
         self._answered, self._ages = dict[int, float](), dict[int, float]()
         self._sampled, self._expected, self._unheard = -1, dict[int, tuple[int, float]](), set[int]()
 
@@ -112,7 +119,7 @@ class SampleExchange:
 
     def stopped(self) -> bool:
         """See ``Exchange``."""
-        return self.membership.stopped
+        return self.membership.stopped or RETURNS in self._states.values()
 
     def facts(self) -> dict[str, Any]:
         """Return what a run reports about its processes: answers, messages of the team, ages of commands."""
@@ -131,18 +138,23 @@ class SampleExchange:
         refused = {why.name: n for why, n in self._end.refusals.counts.items()}
         return {"processes": processes, "refused": refused, **self.membership.facts(), **ages}
 
-    def step(self, time: float, measured: Sequence[FloatArray]) -> list[FloatArray]:
+    def step(
+        self, time: float, measured: Sequence[FloatArray], stamps: Sequence[FloatArray] | None = None
+    ) -> list[FloatArray]:
         """See ``Exchange``."""
         if self._sampled != self.sample:
-            self._take_sample(time, measured)
+            self._take_sample(time, measured, stamps)
         self.sample += 1
         return [self._effort(k, own) for k, own in enumerate(measured)]
 
-    def look(self, time: float, measured: Sequence[FloatArray]) -> FloatArray:
+    def look(
+        self, time: float, measured: Sequence[FloatArray], stamps: Sequence[FloatArray] | None = None
+    ) -> FloatArray:
         """See ``Exchange``."""
         if time == self.sample * self._period:
-            self._take_sample(time, measured)
+            self._take_sample(time, measured, stamps)
         elif not self.trouble():
+            self._stamps = [np.full(2, time) for _ in measured] if stamps is None else stamps
             self._ask(time, measured, step=False)
         needed = {(SUPERVISOR, Status), *((k, Telemetry) for k in self._everyone[:-1])}
         if not needed <= self._last.keys():
@@ -152,8 +164,11 @@ class SampleExchange:
         shown = [self._last[k, Telemetry].values for k in self._everyone[:-1]]
         return np.concatenate([*shown, [status.cell, status.entry, status.arrived, *status.causes]])
 
-    def _take_sample(self, time: float, measured: Sequence[FloatArray]) -> None:
+    def _take_sample(
+        self, time: float, measured: Sequence[FloatArray], stamps: Sequence[FloatArray] | None
+    ) -> None:
         """Let everybody compute once, which shows before the update what it would log."""
+        self._stamps = [np.full(2, time) for _ in measured] if stamps is None else stamps
         self._before(self.sample)
         if self._pacing is not None:
             for _ in range(0 if self.sample else _REHEARSALS):
@@ -173,14 +188,14 @@ class SampleExchange:
     def _close_line(self, time: float) -> None:
         """Let the drives go on where all robots have begun their cell at the present sample."""
         efforts = [self._last.get((k, Effort)) for k in self._everyone[:-1]]
-        begun = all(e and e.number == self.sample and e.state in (FOLLOWS, HOLDS) for e in efforts)
+        begun = all(e and e.number == self.sample and e.state in MOVES for e in efforts)
         if self.membership.stopped and begun and not self.missing:
-            self.membership.close_line(time)
+            self.membership.close_line(time, certified=RETURNS not in self._states.values())
 
     def _effort(self, robot: int, measured: FloatArray) -> FloatArray:
         """Return what the drives of a robot do."""
         if self.membership.stopped or (known := self._last.get((robot, Effort))) is None:
-            return braking_effort(measured[:-3], self.damping[robot])
+            return braking_effort(measured[:-3], self.damping[robot], self._rests.get(robot))
         return np.array(known.efforts)
 
     def _await(self, time: float, measured: Sequence[FloatArray]) -> None:
@@ -207,7 +222,8 @@ class SampleExchange:
         self._end.begin(self.sample)
         flags = {"step": step, "stopped": self.membership.stopped}
         asking = {
-            k: question(k, self.sample, self._clock(k, time), measured, self._counts, **flags) for k in asked
+            k: question(k, self.sample, self._clock(k, time), measured, self._counts, self._stamps, **flags)
+            for k in asked
         }
         self._expected = {k: (q.number, q.time) for k, q in asking.items() if self._end.send(k, q)}
         for index, late_ones in self._end.release().items():
@@ -275,6 +291,9 @@ class SampleExchange:
             self._end.efforts.refusals.add(Reason.VALUE)
             return nothing
         asked, time = self._asked[message.number]
+        if isinstance(message, Effort) and not time - self._oldest <= message.stamp <= time + _ROUNDING:
+            self._end.efforts.refusals.add(Reason.STAMP)
+            return nothing
         expected = self._expected.get(sender, (self.sample, -inf))
         present = (message.number, getattr(message, "time", inf)) >= expected
         age = clocks.monotonic() - asked
@@ -293,6 +312,8 @@ class SampleExchange:
             self._last[sender, kind] = message
             if kind is not Telemetry:
                 self._answered[sender], self._ages[sender] = time, age
+            if isinstance(message, Effort) and message.rest:
+                self._rests[sender] = np.array(message.rest)
         if was_missing and kind is not Telemetry and (self._pacing is not None or unheard):
             self._unheard.discard(sender)
             self.membership.back(sender)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-FOLLOWS, HOLDS, STANDS, ASKS, OUTSIDE = range(5)
+FOLLOWS, HOLDS, STANDS, ASKS, OUTSIDE, RETURNS, LATE = range(7)
 """States of a robot, see ``messages.Effort``."""
 
 STATES = (
@@ -11,8 +11,13 @@ STATES = (
     "waits at rest to begin its cell anew",
     "does not know the current cell",
     "rests where it cannot begin its cell anew",
+    "returns slowly to its cell, uncertified",
+    "has measurements that are older than the plan allows, or stamps that cannot be",
 )
 """The same in words."""
+
+MOVES = (FOLLOWS, HOLDS, RETURNS)
+"""States in which a robot gives efforts of its own."""
 
 AGAIN = 0.1
 """Time after which a message that has had no effect yet is sent again [s]: long for a message and its answer,
@@ -29,6 +34,9 @@ LOSSY_REPORT_TIMEOUT = 0.01
 LOSSY_COPIES = 3
 """In so many further samples the supervisor sends a new cell, after a robot has missed one [-]: with
 a fifth of all messages lost, a robot then misses all of them less than twice in a thousand cells."""
+
+LASTING = 0.3
+"""For how long a robot sees rest before it says so [s]: braked teams swing with periods above a second."""
 
 AHEAD = 0.1
 """Time between the order to begin and the sample at which all robots begin [s]: every robot must have heard

@@ -17,21 +17,41 @@ class Stillness:
 
     Args:
         period: Time between two samples [s].
+        lasting: For how long rest must have been seen without a break [s]; what swings rests at its turning
+            points, too.
     """
 
-    def __init__(self, period: float) -> None:
+    def __init__(self, period: float, lasting: float = 0.0) -> None:
+        self._needed, self._rested = whole_periods(lasting, period), 0
         self._samples: deque[FloatArray] = deque(maxlen=whole_periods(MEAN_TIME, period))
+        self._seen: deque[FloatArray] = deque(maxlen=self._samples.maxlen)
 
     def restart(self) -> None:
         """Forget all samples."""
+        self._rested = 0
         self._samples.clear()
+        self._seen.clear()
 
-    def sees_rest(self, rates: FloatArray) -> bool:
+    @property
+    def full(self) -> bool:
+        """Whether samples over the whole window have been seen."""
+        return len(self._samples) == self._samples.maxlen
+
+    def sees_rest(self, rates: FloatArray, seen: FloatArray | None = None) -> bool:
         """Take in a sample; return whether the mean of no rate exceeds ``RATE_TOLERANCE`` over the window.
 
         Args:
             rates: All rates that count [m/s or rad/s].
+            seen: What :meth:`mean` averages.
         """
         self._samples.append(np.array(rates))
-        full = len(self._samples) == self._samples.maxlen
-        return full and bool(np.abs(np.mean(self._samples, axis=0)).max() <= RATE_TOLERANCE)
+        if seen is not None:
+            self._seen.append(np.array(seen))
+        rests = self.full and bool(np.abs(np.mean(self._samples, axis=0)).max() <= RATE_TOLERANCE)
+        self._rested = self._rested + 1 if rests else 0
+        return self._rested > self._needed
+
+    def mean(self) -> FloatArray:
+        """Return the mean of what was seen over the window."""
+        mean: FloatArray = np.mean(self._seen, axis=0)
+        return mean

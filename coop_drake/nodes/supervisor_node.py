@@ -15,10 +15,15 @@ from coop_drake.nodes.sampled import SampledDiagram
 from coop_drake.nodes.states import AHEAD, LOSSY_COPIES
 from coop_drake.scenario import Hold as HoldSettings
 from coop_drake.systems import CellPlanner
+from coop_drake.tree.circles import whole_turns
 from coop_drake.tree.pose import FloatArray
 
 _NOTHING = np.array([-1.0, -1.0])
 """What is heard of a robot before its first message, as in a clear channel."""
+
+
+SPARE = 10
+"""Samples by which the slow way takes longer than robots say [-]."""
 
 
 class SupervisorNode:
@@ -126,13 +131,24 @@ class SupervisorNode:
         return said
 
     def _gathered(self, number: int) -> list[Switch | Hold | Begin]:
-        """Return the order to begin, once all robots have said that they rest since the drives brake."""
+        """Return the order to begin, once all robots have said that they rest since the drives brake.
+
+        The cell is one that holds all robots, the present one where it does.
+        """
         robots = range(self._robots)
         resting = all(k in self._resting and self._resting[k].sample > self._since for k in robots)
         if self._order is not None or not resting or not self.knows:
             return []
         sample = number + 1 + whole_periods(AHEAD, self._period)
-        self._order = Begin(self._place.cell, sample, self._resting[0].object_pose)
+        told = [self._resting[k] for k in robots]
+        poses = np.array([one.object_pose for one in told])
+        poses[:, 2] += whole_turns(poses[:, 2], np.full(len(told), poses[0, 2]))
+        pose = tuple(poses.mean(axis=0).tolist())
+        # The mean of all robots' poses is another one than each of them has computed its way for.
+        slow = max(one.needed for one in told) + SPARE
+        common = set.intersection(*({*one.cells} for one in told)) & {*range(self._cells)}
+        cell = min(common, key=lambda c: (abs(c - self._place.cell), c), default=self._place.cell)
+        self._order = Begin(cell, sample, slow, pose)
         return [self._order]
 
     def hear(self, robot: int, messages: Iterable[Any]) -> None:

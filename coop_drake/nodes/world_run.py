@@ -22,6 +22,7 @@ from coop_drake.nodes.pacing import Pacing
 from coop_drake.nodes.processes import LocalTeam, question_of, robots_of
 from coop_drake.nodes.sample_exchange import PATIENCE, SampleExchange
 from coop_drake.nodes.serving import TURN
+from coop_drake.nodes.stamps import certified_age
 from coop_drake.nodes.states import REJOIN, RESTARTS
 from coop_drake.plant.team import base_inertia
 from coop_drake.progress import Progress
@@ -93,6 +94,7 @@ def run_world(
         links,
         pacing=pacing,
         tolerated=tolerated_age(scenario.deployment, plan.budget),
+        oldest=certified_age(plan.budget) + TOLERATED,
         gone=gone,
         patience=patience,
         rejoin=rejoin,

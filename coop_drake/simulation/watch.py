@@ -55,7 +55,6 @@ class Watch:
         self._telemetry = Telemetry(loop, root)
         self._goal = goal
         self._last: Sample | None = None
-        self._returns = False
         self._asked_since: float | None = None
 
     @property
@@ -74,7 +73,7 @@ class Watch:
             self._observer(sample)
         if isinstance(self._loop, World) and (self._loop.link.trouble or self._loop.link.stopped):
             self._see_stop(sample, margins, self._loop.link.trouble)
-        elif margins.violation and not (self._returns and self._still_returns(margins)):
+        elif margins.violation:
             self.violation = margins.violation
         elif (asking := self._beyond_holding(sample)) is not None:
             self.violation = f"at t = {sample.time:.6g} s in cell {sample.cell}: {asking}"
@@ -121,18 +120,11 @@ class Watch:
             )
 
     def _see_stop(self, sample: Sample, margins: Margins, trouble: str) -> None:
-        """Watch a team whose drives brake for contacts, until it begins its cell anew or cannot go on."""
-        self._returns = True
+        """Watch a team that does not follow the plan for contacts, until it does so again or cannot go on."""
         if not min(margins.workspace_clearance, margins.body_clearance) > 0.0:
             self.violation = f"{trouble or 'while the drives braked'}; {margins.violation}"
         elif trouble:
             self.violation = f"{trouble}, without contact"
-
-    def _still_returns(self, margins: Margins) -> bool:
-        """Whether a team that has begun its cell anew has touched nothing and is not in its slices again."""
-        free = min(margins.workspace_clearance, margins.body_clearance, margins.cell_clearance) > 0.0
-        self._returns = free and not margins.slice_margin > 0.0 and margins.funnel_margin > 0.0
-        return self._returns
 
     def give_up(self, why: str) -> None:
         """End the run without arrival; the message names the condition that was not met.

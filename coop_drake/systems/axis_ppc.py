@@ -90,10 +90,6 @@ class AxisPpc(Block):
         """Return the state where a cell is begun at rest at these axes; None for no jumps."""
         return np.array([cell, *first_jumps(self._tables[cell], axes)])
 
-    def set_table(self, cell: int, table: FloatArray) -> None:
-        """Give the axes other rows in a cell; blocks that were built from the same laws have them, too."""
-        self._tables[cell][:] = table
-
     def _states(self, context: Context, axes: int) -> tuple[FloatArray, FloatArray]:
         object_state = self._object.Eval(context)
         return object_state, self._robot.Eval(context) if axes > 1 else object_state

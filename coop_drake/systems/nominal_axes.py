@@ -95,7 +95,7 @@ class NominalAxes(Block):
         rest = np.zeros_like(axes)
         return np.concatenate([axes, rest, rest, *[axes, rest] * self._motion.measurement_periods])
 
-    def _states(self, context: Context) -> FloatArray:
+    def states_of(self, context: Context) -> FloatArray:
         """Return x^, x^' and a^, then older x^ and x^', shape (3 + 2 m, 1 + n)."""
         state: FloatArray = context.get_discrete_state_vector().value()
         return state.reshape(-1, self._motion.start.size)
@@ -104,11 +104,11 @@ class NominalAxes(Block):
         """Return x^, x^' and a^ half a period and a lag later, shape (3, 1 + n)."""
         later, motion = np.empty((3, self._motion.start.size)), self._motion
         time = 0.5 * motion.period + motion.lag
-        self._carry(self._states(context)[:3], self._law.Eval(context), time, motion.lag, later)
+        self._carry(self.states_of(context)[:3], self._law.Eval(context), time, motion.lag, later)
         return later
 
     def _write_object(self, context: Context, output: BasicVector) -> None:
-        self._show_object(context, self._states(context), output)
+        self._show_object(context, self.states_of(context), output)
 
     def _write_object_ahead(self, context: Context, output: BasicVector) -> None:
         self._show_object(context, self._ahead(context), output)
@@ -119,7 +119,7 @@ class NominalAxes(Block):
         shown[2], shown[5] = states[0, 0], states[1, 0]
 
     def _write_robot(self, context: Context, output: BasicVector) -> None:
-        self._show_robot(context, self._states(context), output)
+        self._show_robot(context, self.states_of(context), output)
 
     def _write_robot_ahead(self, context: Context, output: BasicVector) -> None:
         self._show_robot(context, self._ahead(context), output)
@@ -130,16 +130,16 @@ class NominalAxes(Block):
         self._place(states, self._motion.mounting, shown)
 
     def _write_axes(self, context: Context, output: BasicVector) -> None:
-        output.SetFromVector(self._states(context)[:2].ravel())
+        output.SetFromVector(self.states_of(context)[:2].ravel())
 
     def _write_pulled(self, context: Context, output: BasicVector) -> None:
-        states, law, seen = self._states(context), self._law.Eval(context), self._object.Eval(context)
+        states, law, seen = self.states_of(context), self._law.Eval(context), self._object.Eval(context)
         expected = states[-2:] if self._motion.measurement_periods else states[:2]
         robot = self._robot.Eval(context) if states.shape[1] > 1 else seen
         self._pull(law, seen, robot, expected, self._gains, output.get_mutable_value())
 
     def _step(self, context: Context, discrete_state: DiscreteValues) -> EventStatus:
-        motion, states = self._motion, self._states(context)
+        motion, states = self._motion, self.states_of(context)
         following = discrete_state.get_mutable_vector().get_mutable_value().reshape(states.shape)
         self._carry(states[:3], self._law.Eval(context), motion.period, motion.lag, following[:3])
         if motion.measurement_periods:

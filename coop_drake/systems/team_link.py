@@ -37,13 +37,16 @@ def supervisor_record(robots: int, *, holds: bool) -> dict[str, int]:
 class Exchange(Protocol):
     """What carries measurements, efforts and what is logged between the world, robots and the supervisor."""
 
-    def step(self, time: float, measured: Sequence[FloatArray]) -> Sequence[FloatArray]:
+    def step(
+        self, time: float, measured: Sequence[FloatArray], stamps: Sequence[FloatArray] | None = None
+    ) -> Sequence[FloatArray]:
         """Hand over a sample, for which everybody computes once, and return the effort of every robot.
 
         Args:
             time: Time of the sample [s].
             measured: For every robot its own state and the object's pose as it measures them, shape
                 (2 (3 + n_k) + 3,).
+            stamps: For every robot when the pose and the state were measured, shape (2,) [s]; None for now.
         """
         ...
 
@@ -52,10 +55,12 @@ class Exchange(Protocol):
         ...
 
     def stopped(self) -> bool:
-        """Return whether the drives brake, so that nobody follows the plan."""
+        """Return whether the drives brake, or the team returns to its cell: nobody follows the plan then."""
         ...
 
-    def look(self, time: float, measured: Sequence[FloatArray]) -> FloatArray:
+    def look(
+        self, time: float, measured: Sequence[FloatArray], stamps: Sequence[FloatArray] | None = None
+    ) -> FloatArray:
         """Return what everybody would log at an instant: all robots' records, then the supervisor's."""
         ...
 
@@ -66,6 +71,8 @@ class TeamLink(Block):
     ======= ============================ ========== ========================================================
     input   ``robot_<k>_state``          2(3+n_k)   own state of robot k as it measures it
     input   ``robot_<k>_object_pose``    3          the object's pose as robot k measures it
+    input   ``robot_<k>_pose_stamp``     1          when that pose was measured [s]
+    input   ``robot_<k>_state_stamp``    1          when that state was measured [s]
     output  ``robot_<k>_effort_command`` 3 + n_k    what robot k asked for in the last sample, held
     output  ``records``                             records of all robots, then that of the supervisor
     ======= ============================ ========== ========================================================
@@ -86,6 +93,11 @@ class TeamLink(Block):
         states = [self.DeclareVectorInputPort(f"robot_{k}_state", 2 * size) for k, size in enumerate(sizes)]
         poses = [self.DeclareVectorInputPort(f"robot_{k}_object_pose", 3) for k in range(len(sizes))]
         self._inputs = [*zip(states, poses, strict=True)]
+        stamped = [
+            [self.DeclareVectorInputPort(f"robot_{k}_{part}_stamp", 1) for k in range(len(sizes))]
+            for part in ("pose", "state")
+        ]
+        self._stamps = [*zip(*stamped, strict=True)]
         self.DeclareDiscreteState(np.zeros(sum(sizes)))
         ends = np.cumsum(sizes)
         for k, (size, end) in enumerate(zip(sizes, ends, strict=True)):
@@ -100,7 +112,7 @@ class TeamLink(Block):
 
     @property
     def stopped(self) -> bool:
-        """Whether the drives brake, so that nobody follows the plan."""
+        """Whether the drives brake, or the team returns to its cell: nobody follows the plan then."""
         return self._exchange.stopped()
 
     def _declare_effort(self, name: str, part: slice) -> None:
@@ -112,9 +124,14 @@ class TeamLink(Block):
     def _measured(self, context: Context) -> list[FloatArray]:
         return [np.concatenate([port.Eval(context) for port in ports]) for ports in self._inputs]
 
+    def _stamped(self, context: Context) -> list[FloatArray]:
+        return [np.concatenate([port.Eval(context) for port in ports]) for ports in self._stamps]
+
     def _sample(self, context: Context, discrete_state: DiscreteValues) -> None:
-        efforts = self._exchange.step(context.get_time(), self._measured(context))
+        given = self._measured(context), self._stamped(context)
+        efforts = self._exchange.step(context.get_time(), *given)
         discrete_state.get_mutable_vector().SetFromVector(np.concatenate(efforts))
 
     def _write_records(self, context: Context, output: BasicVector) -> None:
-        output.SetFromVector(self._exchange.look(context.get_time(), self._measured(context)))
+        given = self._measured(context), self._stamped(context)
+        output.SetFromVector(self._exchange.look(context.get_time(), *given))

@@ -20,6 +20,7 @@ from coop_drake.verification.budgets import (
     check_efforts,
     check_origin,
     check_position,
+    check_restart,
 )
 from coop_drake.verification.checks import Check, Verified
 from coop_drake.verification.gains import check_gains
@@ -66,8 +67,8 @@ def verify_plan(
         if further is not None
     ]
     checks += check_position(plan, problem.position_tolerance)
-    axes = check_budget(plan, problem.tree)
-    checks += [*([] if axes is None else [axes]), *check_efforts(plan)]
+    of_axes = check_budget(plan, problem.tree), check_restart(plan, problem.tree)
+    checks += [*(check for check in of_axes if check is not None), *check_efforts(plan)]
     whose = f", {origin.name}" if origin is not None else ""
     return Verified(
         "found",

@@ -25,11 +25,11 @@ BUDGET = "deployment: {preset: mobile_base, budget: all, actuators: {base_force:
 class Wrapping(DirectExchange):
     """Sensors of the object's angle and of joints show them in (-pi, pi]."""
 
-    def step(self, time, measured):
-        return super().step(time, [self._wrapped(own) for own in measured])
+    def step(self, time, measured, stamps=None):
+        return super().step(time, [self._wrapped(own) for own in measured], stamps)
 
-    def look(self, time, measured):
-        return super().look(time, [self._wrapped(own) for own in measured])
+    def look(self, time, measured, stamps=None):
+        return super().look(time, [self._wrapped(own) for own in measured], stamps)
 
     @staticmethod
     def _wrapped(own):

@@ -100,9 +100,9 @@ def test_a_changed_byte_is_refused_or_gives_another_message_of_the_schema(sent, 
         (b"\4\1\x81\0", Reason.LENGTH),
         (b"\4\1\xff\xff\xff\xff\x7f", Reason.LENGTH),
         (encode(Ready(1, True), 0, 1, 1)[:-1] + b"\2", Reason.VALUE),
-        (encode(Effort(1, 0, 0, (float("nan"),)), 0, 1, 1), Reason.VALUE),
-        (encode(Effort(1, 0, 0, (1.0, float("inf"))), 0, 1, 1), Reason.VALUE),
-        (encode(Sample(1, float("nan"), True, False, 0, (), ()), 0, 1, 1), Reason.VALUE),
+        (encode(Effort(1, 0.0, 0, 0, (float("nan"),)), 0, 1, 1), Reason.VALUE),
+        (encode(Effort(1, 0.0, 0, 0, (1.0, float("inf"))), 0, 1, 1), Reason.VALUE),
+        (encode(Sample(1, float("nan"), True, False, 0, 0.0, 0.0, (), ()), 0, 1, 1), Reason.VALUE),
         (encode(Status(1, 0.0, True, (), 0, 0.0, False, (0,) * (MOST_ITEMS + 1), 0), 0, 1, 1), Reason.LENGTH),
     ],
 )
@@ -113,7 +113,7 @@ def test_each_departure_has_its_reason(data, reason):
 
 
 def test_a_length_that_counts_more_than_there_is_is_refused_before_it_is_read():
-    data = bytearray(encode(Effort(1, 0, 0, (1.0, 2.0)), 0, 1, 1))
+    data = bytearray(encode(Effort(1, 0.0, 0, 0, (1.0, 2.0)), 0, 1, 1))
     struct.pack_into("<H", data, header_of(data).size + 9, 65535)
     with pytest.raises(RefusedError) as refused:
         read(bytes(data))

@@ -71,11 +71,15 @@ def team(request) -> Iterator[Team]:
 def test_samples_and_efforts_cross_in_lock_step(team):
     for number in range(1, 6):
         for k, robot in enumerate(team.robots):
-            sample = Sample(number, 0.005 * number, True, False, 0, (1.0, 2.0, 0.5), (float(k), *range(9)))
+            sample = Sample(
+                number, 0.005 * number, True, False, 0, 0.0, 0.0, (1.0, 2.0, 0.5), (float(k), *range(9))
+            )
             assert team.world.send(k, sample)
             sender, heard = robot.receive(LIMIT)
             assert (sender, heard) == (WORLD, sample)
-            robot.efforts.send(Effort(heard.number, robot.team.sent, 0, (0.1 * k, -1.0, 2.0)))
+            robot.efforts.send(
+                Effort(heard.number, heard.pose_stamp, robot.team.sent, 0, (0.1 * k, -1.0, 2.0))
+            )
         efforts = dict(team.world.receive(LIMIT) for _ in range(2))
         assert [efforts[k].efforts[0] for k in range(2)] == [0.0, 0.1]
     assert all(end.refusals.total == 0 for end in team.ends)

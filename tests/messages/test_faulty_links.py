@@ -58,13 +58,13 @@ def test_late_messages_leave_after_what_is_sent_then_and_count_where_nothing_has
 
 def test_nothing_passes_a_gap_but_what_the_log_needs():
     gap = Gap(0.02, 0.03, robots=(0,))
-    samples = [Sample(k, k * PERIOD, True, False, 0, (), ()) for k in range(8)]
+    samples = [Sample(k, k * PERIOD, True, False, 0, 0.0, 0.0, (), ()) for k in range(8)]
     faults = Faults(sensors=ChannelFaults(gaps=(gap,)), efforts=ChannelFaults(gaps=(gap,)))
     assert sending("sensors", faults, samples, WORLD, 0)[0] == [(1,), (2,), (), (), (), (6,), (7,), (8,)]
     assert sending("sensors", faults, samples, WORLD, 1)[1] == 8
     looks = [sample._replace(step=False) for sample in samples]
     assert sending("sensors", faults, looks, WORLD, 0)[1] == 8
-    assert sending("efforts", faults, [Effort(k, 0, 0, ()) for k in range(8)], 0, WORLD)[1] == 5
+    assert sending("efforts", faults, [Effort(k, 0.0, 0, 0, ()) for k in range(8)], 0, WORLD)[1] == 5
     assert sending("efforts", faults, [Telemetry(k, 0.0, 0, 0, 0, ()) for k in range(8)], 0, WORLD)[1] == 8
     assert sending("efforts", faults, [Present()] * 8, 0, WORLD)[1] == 8
 

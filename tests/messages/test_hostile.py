@@ -89,7 +89,7 @@ def test_malformed_messages_are_refused_with_and_without_a_session(pairs):
         stranger.send(data)
         honest._put(data)
     stranger.send_multipart([good, good, good])
-    honest._put(encode(Effort(1, 1, 0, (1.0,)), 0, honest.session, 2))
+    honest._put(encode(Effort(1, 0.0, 1, 0, (1.0,)), 0, honest.session, 2))
     counts = pairs.refused(2 * len(bad) + 2)
     assert sum(counts.values()) == 2 * len(bad) + 2
     assert {"LENGTH", "PARTS", "KIND"} <= set(counts)

@@ -4,8 +4,11 @@ import pytest
 import zmq
 
 from coop_drake.errors import MessagingError
-from coop_drake.messages import Effort, Hello, Present, Question, Ready, Switch
-from coop_drake.messages.codec import encode
+from coop_drake.messages import SUPERVISOR, Effort, Hello, Present, Question, Ready, Switch
+from coop_drake.messages.agreement import OTHER_VERSION
+from coop_drake.messages.codec import VERSION, encode
+from coop_drake.messages.schema import TurnedAway
+from coop_drake.messages.wire import KINDS
 from tests.support.message_pairs import LIMIT, QUESTION, Pairs
 
 
@@ -91,7 +94,7 @@ def test_what_nobody_reads_is_not_kept_for_ever():
 
 def test_nothing_is_sent_without_a_session(pairs):
     client = pairs.client(0)
-    assert not client.send(Effort(1, 0, 0, ()))
+    assert not client.send(Effort(1, 0.0, 0, 0, ()))
     assert not pairs.server.send(0, Switch(1, 2))
     assert (client.unsent, pairs.server.peers[0].unsent) == (1, 1)
 
@@ -113,3 +116,26 @@ def test_a_process_that_asks_again_before_it_reads_the_answer_gets_one_session(p
     assert pairs.settle(lambda: peer.incoming.received == 2, client) == [(0, Ready(1, True))]
     assert peer.sessions == client.sessions == 1
     assert (pairs.server.refusals.total, client.refusals.total) == (0, 0)
+
+
+def test_a_process_of_another_version_is_turned_away_by_that_reason_in_its_own_words(pairs):
+    """Headers that open sessions, the nonce and ``TurnedAway`` are the same in all versions."""
+    old = pairs.stranger()
+    hello = bytearray(encode(Hello(77, *QUESTION), 0, 0, 0))
+    hello[3] = VERSION - 1
+    old.send(bytes(hello + b"a field that this version does not know"))
+    while not old.poll(20):
+        pairs.server.receive(0.01)
+    answer = old.recv()
+    assert answer[3] == VERSION - 1
+    assert answer[0] == KINDS[TurnedAway].code
+    assert answer[5:] == (77).to_bytes(4, "little") + bytes([OTHER_VERSION])
+    assert pairs.refused(1) == {"VERSION": 1}
+
+
+def test_a_process_that_hears_another_version_says_so(pairs):
+    client = pairs.client(0)
+    answer = bytearray(encode(TurnedAway(5, OTHER_VERSION), SUPERVISOR, 0, 0))
+    answer[3] = VERSION + 1
+    client._take([zmq.Frame(bytes(answer))])
+    assert client.trouble == "it speaks another version of the protocol"

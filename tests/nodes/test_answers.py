@@ -10,7 +10,7 @@ from coop_drake.messages import SUPERVISOR, Effort, Reason, Refusals, Status, Te
 from coop_drake.messages.outgoing import Links
 from coop_drake.nodes.sample_exchange import SampleExchange
 
-GOOD = Effort(0, 1, 0, (1.0, 2.0, 3.0, 4.0))
+GOOD = Effort(0, 0.0, 1, 0, (1.0, 2.0, 3.0, 4.0))
 SHOWN = Telemetry(0, 0.0, 1, 0, 3, ())
 STATUS = Status(0, 0.0, True, (0,), 0, 0.0, False, (), 0)
 

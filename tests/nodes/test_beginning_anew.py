@@ -7,7 +7,8 @@ from coop_drake.diagram import build_station
 from coop_drake.diagram.knowledge import robot_knowledge
 from coop_drake.messages import AtRest, Begin, Place, Ready, Switch
 from coop_drake.nodes import RobotNode, SupervisorNode
-from coop_drake.nodes.states import ASKS, FOLLOWS, OUTSIDE, STANDS
+from coop_drake.nodes.states import ASKS, FOLLOWS, OUTSIDE, RETURNS, STANDS
+from coop_drake.nodes.supervisor_node import SPARE
 from tests.support.sampled_team import sampled
 from tests.support.small_loop import small_maps
 
@@ -51,19 +52,21 @@ def stand(node, measured, samples, first=0):
 
 def test_a_robot_at_rest_says_so_ten_times_a_second_and_begins_at_the_ordered_sample(robots):
     node, measured = robots[0], at_start()
-    said = stand(node, measured, 31)
+    said = stand(node, measured, 61)
     assert node.state == STANDS
-    assert [message.sample for message in said] == [9, 19, 29]
-    assert all(message.object_pose == tuple(measured[-3:]) for message in said)
+    assert [message.sample for message in said] == [39, 49, 59]  # It has seen rest for 0.3 s before.
+    assert all(message.object_pose == pytest.approx(measured[-3:], abs=1e-12) for message in said)
     pose = (measured[-3] + 0.001, measured[-2], measured[-1])
-    node.hear([Begin(0, 33, pose)])
-    stand(node, measured, 2, 31)
-    node.step(33 * PERIOD, measured, stopped=True)
-    assert node.state == FOLLOWS
-    assert node.place == Place(True, 0, 33)
-    shown = node.look(34 * PERIOD, measured)
-    assert shown[:2] == pytest.approx(pose[:2], abs=1e-12)
-    node.step(34 * PERIOD, measured)
+    needed = said[0].needed
+    assert needed > 50
+    node.hear([Begin(0, 63, needed, pose)])
+    stand(node, measured, 2, 61)
+    for k in range(63, 63 + needed):  # No plan with a budget: the way is not proved free.
+        node.step(k * PERIOD, measured, stopped=k == 63)
+        assert node.state == RETURNS
+        assert node.place == Place(True, 0, 63)
+        assert node.look(k * PERIOD, measured)[:2] == pytest.approx(pose[:2], abs=1e-12)
+    node.step((63 + needed) * PERIOD, measured)
     assert node.state == FOLLOWS
 
 
@@ -73,9 +76,9 @@ def test_an_order_counts_in_the_turn_that_the_robot_knows(robots):
     for turns in (0, 1, -3):
         begin = 100 * len(efforts)
         stand(node, measured, 31, begin)
-        node.hear([Begin(0, begin + 31, (*measured[-3:-1], measured[-1] + 2.0 * np.pi * turns))])
+        node.hear([Begin(0, begin + 31, 80, (*measured[-3:-1], measured[-1] + 2.0 * np.pi * turns))])
         effort, _ = node.step((begin + 31) * PERIOD, measured, stopped=True)
-        assert node.state == FOLLOWS
+        assert node.state == RETURNS
         efforts.append(effort)
     np.testing.assert_allclose(efforts[1:], [efforts[0]] * 2, atol=1e-6)
 
@@ -90,8 +93,8 @@ def test_wrong_values_do_not_count_turns(robots):
 def test_a_robot_that_hears_the_order_too_late_stands_on(robots):
     node, measured = robots[0], at_start()
     stand(node, measured, 20)
-    node.hear([Begin(0, 15, (0.0, 0.0, 0.0))])
-    assert stand(node, measured, 15, 20)
+    node.hear([Begin(0, 15, 80, (0.0, 0.0, 0.0))])
+    assert stand(node, measured, 40, 20)
     assert node.state == STANDS
 
 
@@ -99,7 +102,7 @@ def test_a_robot_that_moves_or_stands_outside_its_cell_does_not_say_that_it_rest
     node = robots[0]
     assert not stand(node, at_start(rate=0.5), 30)
     assert node.state == STANDS
-    assert not stand(node, at_start((50.0, 50.0, 0.0)), 30, 30)
+    assert not stand(node, at_start((50.0, 50.0, 0.0)), 50, 30)
     assert node.state == OUTSIDE
 
 
@@ -117,20 +120,39 @@ def test_a_robot_that_was_started_again_does_nothing_until_it_knows_the_cell(rob
 
 
 def test_the_supervisor_orders_once_all_have_said_that_they_rest_since_the_drives_brake(supervisor):
-    supervisor.hear(0, [AtRest(3, (1.0, 2.0, 0.5))])
+    supervisor.hear(0, [AtRest(3, (), 40, (1.0, 2.0, 0.5))])
     assert supervisor.step(5 * PERIOD, stopped=True) == []
-    supervisor.hear(1, [AtRest(16, (1.1, 2.1, 0.6))])
+    supervisor.hear(1, [AtRest(16, (), 60, (1.1, 2.1, 0.6))])
     assert supervisor.step(17 * PERIOD, stopped=True) == []
-    supervisor.hear(0, [AtRest(17, (1.2, 2.2, 0.7))])
-    assert supervisor.step(18 * PERIOD, stopped=True) == [Begin(0, 29, (1.2, 2.2, 0.7))]
+    supervisor.hear(0, [AtRest(17, (), 50, (1.2, 2.2, 0.7))])
+    (order,) = supervisor.step(18 * PERIOD, stopped=True)
+    assert order[:3] == (0, 29, 60 + SPARE)
+    assert order.object_pose == pytest.approx((1.15, 2.15, 0.65))
     for k in range(19, 29):
         assert supervisor.step(k * PERIOD, stopped=True) == []
     assert supervisor.step(29 * PERIOD, stopped=True) == []
     assert supervisor.look(29 * PERIOD)[:2] == pytest.approx([0.0, 0.29])
     supervisor.step(30 * PERIOD, stopped=True)  # Somebody has not begun: all report rest once more.
-    supervisor.hear(0, [AtRest(40, (1.2, 2.2, 0.7))])
-    supervisor.hear(1, [AtRest(40, (1.2, 2.2, 0.7))])
-    assert supervisor.step(41 * PERIOD, stopped=True) == [Begin(0, 52, (1.2, 2.2, 0.7))]
+    supervisor.hear(0, [AtRest(40, (), 70, (1.2, 2.2, 0.7))])
+    supervisor.hear(1, [AtRest(40, (), 70, (1.2, 2.2, 0.7))])
+    assert supervisor.step(41 * PERIOD, stopped=True) == [Begin(0, 52, 70 + SPARE, (1.2, 2.2, 0.7))]
+
+
+@pytest.mark.parametrize(
+    ("cells", "chosen"),
+    [([(0, 1, 2), (1, 2)], 1), ([(0, 1), (0,)], 0), ([(2,), (1, 2)], 2), ([(1,), (2,)], 1)],
+)
+def test_the_team_begins_a_cell_that_holds_all_robots_the_present_one_where_it_does(
+    supervisor, cells, chosen
+):
+    for k in range(2):
+        supervisor.hear(k, [Ready(0, True)])
+    supervisor.step(2 * PERIOD)
+    supervisor.step(5 * PERIOD, stopped=True)
+    for k, own in enumerate(cells):
+        supervisor.hear(k, [AtRest(16, own, 60, (1.0, 2.0, 0.5))])
+    (order,) = supervisor.step(17 * PERIOD, stopped=True)
+    assert order.cell == chosen
 
 
 def test_a_supervisor_that_was_started_again_learns_the_latest_cell_from_all_robots(supervisor):
@@ -149,9 +171,9 @@ def test_a_supervisor_that_was_started_again_learns_the_latest_cell_from_all_rob
 
 
 def test_what_does_not_fit_is_left_aside(supervisor, robots):
-    supervisor.hear(0, [Place(True, 9, 0), AtRest(5, (1.0,))])
+    supervisor.hear(0, [Place(True, 9, 0), AtRest(5, (), 1, (1.0,))])
     assert supervisor.answers() == []
-    robots[0].hear([Begin(9, 12, (0.0, 0.0, 0.0)), Begin(0, 12, (0.0,))])
+    robots[0].hear([Begin(9, 12, 40, (0.0, 0.0, 0.0)), Begin(0, 12, 40, (0.0,))])
     stand(robots[0], at_start(), 20)
     assert robots[0].state == STANDS
 

@@ -33,7 +33,7 @@ class Hostile:
         """Send twenty messages of all kinds on each connection that takes them."""
         session, number = self._dice.getrandbits(8), sample + 2
         forged = [
-            encode(Effort(sample, 9, 0, (1e6,) * 5), 0, session, number),
+            encode(Effort(sample, 0.01 * sample, 9, 0, (1e6,) * 5), 0, session, number),
             encode(Ready(0, True), 1, session, number),
             encode(Switch(1, sample), SUPERVISOR, session, number),
             encode(Present(), 0, session, 1),

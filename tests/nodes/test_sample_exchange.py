@@ -41,7 +41,7 @@ class Team:
             now.append((index, Status(number, time, True, (0,), 0, 0.0, False, (), 0)))
         else:
             if question.step:
-                now.append((0, Effort(number, 0, 0, (float(number), 0.0, 0.0))))
+                now.append((0, Effort(number, time, 0, 0, (float(number), 0.0, 0.0))))
             now.append((0, Telemetry(number, time, 0, 0, 0, (time,))))
         return True
 

@@ -18,5 +18,6 @@ def last_cells(plan: Plan, problem: PlanningProblem, count: int) -> tuple[Plan, 
     start = np.concatenate([before.target, 0.5 * (before.goal_lower + before.goal_upper)])
     asked = replace(problem, start=start)
     cells, transitions = plan.cells[-count:], plan.transitions[-count:]
-    ended = replace(plan, start=start, cells=cells, transitions=transitions, problem=problem_digest(asked))
-    return timed(ended), asked
+    restart = plan.restart and replace(plan.restart, departures=plan.restart.departures[-count:])
+    ended = replace(plan, start=start, cells=cells, transitions=transitions, restart=restart)
+    return timed(replace(ended, problem=problem_digest(asked))), asked

@@ -108,6 +108,12 @@ FREE = {
     "tube.velocity": Free(SAFE + ", and at most the limit of the object's speed", (0.99, 100.0)),
     "tube.rest": Free(SAFE + ", and less than the goal's tolerance", (0.99, 2.0)),
     "tube.acceleration": Free(SAFE + ", and at most what the bases' forces give", (0.99, 2.0)),
+    "restart": Free("may be left out: then nothing is promised about teams whose drives braked"),
+    "restart.rate": Free("with which the stated departures follow, below the limits of rates", (1.5, 20.0)),
+    "restart.acceleration": Free("likewise, below the limits of accelerations", (2.0, 100.0)),
+    "restart.rest_rate": Free("at least what counts as rest, and so small that the tube holds", (0.5, 50.0)),
+    "restart.wait": Free("at least as long as the loops' responses are", (0.5,)),
+    "restart.departures[][]": Free(SAFE, (0.9,)),
 }
 """All that may be altered in a plan without making a statement false."""
 

@@ -93,9 +93,14 @@ class AxisLoop:
         return _rest(self.budget)
 
     @property
+    def factors(self) -> list[float]:
+        """The factors f of all parts of the model's range [-]."""
+        return _factors(self.budget)
+
+    @property
     def errors(self) -> FloatArray:
         """Largest error of the model in every part, shape (parts,) [-]."""
-        return np.abs(np.array(_factors(self.budget)) - 1.0) + self.rest
+        return np.abs(np.array(self.factors) - 1.0) + self.rest
 
     @property
     def noises(self) -> FloatArray:

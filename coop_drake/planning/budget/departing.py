@@ -22,6 +22,7 @@ from coop_drake.compiled import compiled
 from coop_drake.laws.nominal_axes import lag_factors
 from coop_drake.planning.budget.axis_departure import LATE, AxisLoop
 from coop_drake.planning.budget.axis_sets import AxisSets
+from coop_drake.planning.budget.axis_tube import ACCELERATION, COLUMNS, V
 from coop_drake.tree.pose import FloatArray
 
 ATTEMPTS = 30
@@ -111,6 +112,25 @@ def departing(
     first = min(leaving, samples + 1)
     past = highest[..., first : first + memory].copy()
     return Departures(*found), Inflow(past, np.stack([state[0], state[2]]))
+
+
+def moving_evenly(loop: AxisLoop, coupling: FloatArray, moving: tuple[float, float]) -> Departures:
+    """Bound how far axes depart that were at rest and have moved within the same bounds ever since.
+
+    Args:
+        loop: The loop of all axes.
+        coupling: Coefficients of c, zero for k > j, shape (axes, axes, axes).
+        moving: Largest |x^''| and |x^'| of every axis [rad/s^2 or m/s^2, rad/s or m/s].
+
+    Returns:
+        The largest ones of all times, arrays of shape (axes,).
+    """
+    axes, samples = len(coupling), loop.kicks.shape[2]
+    tube = np.zeros((samples, COLUMNS))
+    tube[:, ACCELERATION], tube[:, V] = moving[0], moving[1] - loop.budget.period * moving[0]
+    even = AxisSets((tube,), 0.0, moving[0], moving[0], 0.0, tube[0, V])
+    found, _ = departing(loop, [even] * axes, coupling, at_rest(loop, axes), samples)
+    return Departures(*(one.max(axis=0) for one in found))
 
 
 @compiled

@@ -15,6 +15,7 @@ from coop_drake.laws.gains import IDEAL_AGE, RestCondition
 from coop_drake.planning.budget.alarms import axis_noises
 from coop_drake.planning.budget.axis_departure import SLACK, best_loop
 from coop_drake.planning.budget.coupling import TeamCouplings, team_couplings
+from coop_drake.planning.budget.restarting import with_restart
 from coop_drake.planning.budget.transitions import (
     LimitedEfforts,
     ProvedTransition,
@@ -78,7 +79,8 @@ def fit_budget(
         _stated(plans[passed.choice].transitions[k], passed, factors[passed.choice], budget)
         for k, passed in enumerate(found)
     )
-    return replace(plans[0], transitions=fitted, budget=budget, axis_tracking=loop.tracking)
+    fitted_plan = replace(plans[0], transitions=fitted, budget=budget, axis_tracking=loop.tracking)
+    return with_restart(fitted_plan, loop, couplings.rates[:, 1:], limited)
 
 
 def _factors(gain_set: ScheduledGains, budget: Budget) -> list[float]:

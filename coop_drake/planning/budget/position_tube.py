@@ -83,10 +83,9 @@ def position_tubes(gains: Sequence[PositionGains], budget: Budget) -> list[Posit
         budget: The departures to be tolerated.
     """
     worst: list[FloatArray | None] = [np.zeros(5) for _ in gains]
-    parts = MODEL_PARTS if budget.model_error > 0.0 else 1
-    rest = budget.model_error / parts
-    for part in range(parts):
-        error = budget.model_error * ((2 * part + 1) / parts - 1.0)
+    errors = position_errors(budget)
+    rest = budget.model_error / len(errors)
+    for error in errors:
         sums = {loop: _sums_of(loop, budget, error) for loop in dict.fromkeys(own.loop for own in gains)}
         for i, own in enumerate(gains):
             before, found = worst[i], _bounds(own, budget, sums[own.loop], rest)
@@ -94,6 +93,12 @@ def position_tubes(gains: Sequence[PositionGains], budget: Budget) -> list[Posit
     return [
         None if bounds is None else _stated(own, bounds) for own, bounds in zip(gains, worst, strict=True)
     ]
+
+
+def position_errors(budget: Budget) -> list[float]:
+    """Return the middles of the parts of the model's range [-]."""
+    parts = MODEL_PARTS if budget.model_error > 0.0 else 1
+    return [budget.model_error * ((2 * part + 1) / parts - 1.0) for part in range(parts)]
 
 
 def _stated(gains: PositionGains, bounds: FloatArray) -> PositionTube:
@@ -129,7 +134,7 @@ def _bounds(gains: PositionGains, budget: Budget, sums: FloatArray | None, rest:
 def _sums_of(loop: Loop, budget: Budget, error: float) -> FloatArray | None:
     """Return ``response_sums`` of a loop with one error of the model; None where it is not stable."""
     T, delay = budget.period, whole_periods(budget.delay, budget.period)
-    sums, left = response_sums(T, *_loop(loop, T, delay, budget.lag, error), ceil(HORIZON / T))
+    sums, left = response_sums(T, *position_loop(loop, T, delay, budget.lag, error), ceil(HORIZON / T))
     return sums if left < LEFT else None
 
 
@@ -150,7 +155,7 @@ def response_sums(
 
     Args:
         T: Control period [s].
-        matrix: Of one period, see ``_loop``, shape (5 + 2 delay, 5 + 2 delay); so are the others.
+        matrix: Of one period, see ``position_loop``, shape (5 + 2 delay, 5 + 2 delay); so are the others.
         held: Response to a unit command held for a period, shape (5 + 2 delay,).
         feedback: What the state adds to the command, shape (5 + 2 delay,).
         nominal: The nominal acceleration, shape (5 + 2 delay,).
@@ -185,7 +190,7 @@ def response_sums(
     return sums, left
 
 
-def _loop(
+def position_loop(
     loop: Loop, T: float, delay: int, lag: float, error: float
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
     """Return the matrix of one period, the response to a unit command held for it, and two rows.

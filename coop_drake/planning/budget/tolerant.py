@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import chain
 
 from shapely.errors import ShapelyError
@@ -22,6 +22,7 @@ from coop_drake.planning.budget.position_fit import (
     fit_position,
     unproved_position,
 )
+from coop_drake.planning.budget.restarting import position_may_rest
 from coop_drake.planning.budget.transitions import UnprovedTransition
 from coop_drake.planning.execution.estimate import plan_time
 from coop_drake.planning.improvement.quickest import quickest_plan
@@ -173,6 +174,16 @@ def _beyond(
 
 
 def _fitted(
+    problem: PlanningProblem, plan: Plan, gain_set: ScheduledGains, budget: Budget, team: TeamCouplings
+) -> Plan | UnprovedTransition | UnprovedPosition:
+    """Return what ``_held`` does; a plan states nothing about rests from which its position is not held."""
+    found = _held(problem, plan, gain_set, budget, team)
+    if isinstance(found, Plan) and not position_may_rest(found, budget):
+        return replace(found, restart=None)
+    return found
+
+
+def _held(
     problem: PlanningProblem, plan: Plan, gain_set: ScheduledGains, budget: Budget, team: TeamCouplings
 ) -> Plan | UnprovedTransition | UnprovedPosition:
     """Return a plan with gains, sets and regions under which its budget holds; or where it does not."""

@@ -11,6 +11,7 @@ from coop_drake.verification.budgets.origin import (
     wrong_facts,
 )
 from coop_drake.verification.budgets.position import check_position
+from coop_drake.verification.budgets.restarting import check_restart
 
 __all__ = [
     "NOT_THE_SCENARIOS",
@@ -21,5 +22,6 @@ __all__ = [
     "check_efforts",
     "check_origin",
     "check_position",
+    "check_restart",
     "wrong_facts",
 ]

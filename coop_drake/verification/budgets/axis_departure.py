@@ -47,6 +47,8 @@ class Loop(NamedTuple):
         noise: What noise causes of e, e' and the pull, shape (p, 3).
         errors: Largest |epsilon| of every part, shape (p, 1).
         spread: Largest |d| [-].
+        started: Largest |e|, |e'| and |q| at all times after a unit of e' at the beginning, and in all
+            measurements that are used first, with any sign, shape (p, 3).
     """
 
     budget: Budget
@@ -55,6 +57,7 @@ class Loop(NamedTuple):
     noise: FloatArray
     errors: FloatArray
     spread: float
+    started: FloatArray
 
 
 class Entered(NamedTuple):
@@ -85,12 +88,14 @@ def loop_of(tracking: AxisTracking, budget: Budget) -> Loop:
     e, v, a = np.zeros((3, 3, parts))  # runs: a command, a rate, a place
     v[1], e[2] = 1.0, 1.0
     past = deque([(0.0 * e, 0.0 * v)] * delay, maxlen=delay + 1)
-    command, sizes = np.zeros((3, parts)), []
+    command, started, largest, sizes = *np.zeros((3, 3, parts)), []
     for k in range(ceil(HORIZON / T)):
         past.append((e, v))
         pull = -tracking.stiffness * past[0][0] - tracking.damping * past[0][1]
         found = np.array([e, v, pull])
         command += np.abs(found[:, 0])
+        started = np.maximum(started, np.abs(found[:, 1]))
+        largest = np.maximum(largest, np.abs(found[:, 0]) if k else np.array([0.0, 0.0, 1.0])[:, None])
         sizes.append(T * mean_size(found[:, 1], found[:, 1] + T * found[:, 2]))
         if k == 0:
             pull[0] += 1.0
@@ -104,7 +109,13 @@ def loop_of(tracking: AxisTracking, budget: Budget) -> Loop:
     noise = size * (command.T + np.array([0.0, 0.0, 1.0]))
     recent = np.ascontiguousarray(kicks[:, :memory][:, ::-1])
     return Loop(
-        budget, recent, kicks[:, memory:].sum(axis=1), noise, np.abs(errors)[:, None] + spread, spread
+        budget,
+        recent,
+        kicks[:, memory:].sum(axis=1),
+        noise,
+        np.abs(errors)[:, None] + spread,
+        spread,
+        (started + tracking.damping * delay * largest).T,
     )
 
 

@@ -43,6 +43,38 @@ def asked(budget: Budget, moving: FloatArray, pulls: FloatArray) -> Asked:
     return Asked(moving[:, 0] + pulls, moving[:, 1] + later * moving[:, 0])
 
 
+def efforts_asked(
+    plan: Plan, tree: ComponentTree, every: Sequence[Asked]
+) -> tuple[list[FloatArray], FloatArray]:
+    """Return the largest efforts that follow in each transition, and their limits, of shape (efforts,) each.
+
+    Args:
+        plan: A plan whose budget limits efforts.
+        tree: Its team.
+        every: What is asked in each transition.
+
+    Raises:
+        RefusalError: The plan has no tube.
+    """
+    budget, tube, efforts = plan.budget, plan.tube, list[FloatArray]()
+    assert budget is not None  # checked by the caller
+    if tube is None:
+        raise RefusalError("tube", "is missing, but the plan has a budget")
+    ahead = 0.5 * budget.period + budget.lag
+    room = np.array([ahead * float(one.rates.max()) for one in every])
+    push, axes, rates = effort_shares(budget, tree, plan.cells, room)
+    robots, n = budget.robots, len(tree.joints)
+    limits, damping = np.array(budget.effort_limits(n)), np.zeros((2 * robots + n, 1 + n))
+    for joint, value in enumerate(budget.dampings):
+        damping[2 * robots + joint, 1 + joint] = value
+    for k, one in enumerate(every):
+        turned = one.accelerations @ axes[k].T + ((one.rates @ rates[k]) * one.rates[None]).sum(axis=2).T
+        believed = 1.0 + budget.model_error
+        found = believed * (push[k] * tube.acceleration + turned.max(axis=0))
+        efforts.append(found + (one.rates @ damping.T).max(axis=0))
+    return efforts, limits
+
+
 def check_stated_efforts(plan: Plan, tree: ComponentTree, every: Sequence[Asked]) -> None:
     """Check that the efforts that transitions state are at least what follows, and at most what is allowed.
 
@@ -54,26 +86,12 @@ def check_stated_efforts(plan: Plan, tree: ComponentTree, every: Sequence[Asked]
     Raises:
         RefusalError: Names the transition and the effort.
     """
-    budget, tube = plan.budget, plan.tube
-    assert budget is not None  # checked by the caller
-    if tube is None:
-        raise RefusalError("tube", "is missing, but the plan has a budget")
-    ahead = 0.5 * budget.period + budget.lag
-    room = np.array([ahead * float(one.rates.max()) for one in every])
-    push, axes, rates = effort_shares(budget, tree, plan.cells, room)
-    robots, n = budget.robots, len(tree.joints)
-    limits, damping = np.array(budget.effort_limits(n)), np.zeros((2 * robots + n, 1 + n))
-    for joint, value in enumerate(budget.dampings):
-        damping[2 * robots + joint, 1 + joint] = value
-    for k, (transition, one) in enumerate(zip(plan.transitions, every, strict=True)):
+    efforts, limits = efforts_asked(plan, tree, every)
+    for k, (transition, found) in enumerate(zip(plan.transitions, efforts, strict=True)):
         assert transition.tolerance is not None  # checked by the caller
         stated, where = transition.tolerance.effort, f"transitions[{k}].tolerance.effort"
         if stated.shape != limits.shape:
             raise RefusalError(where, f"has {stated.size} numbers, not {limits.size}")
-        turned = one.accelerations @ axes[k].T + ((one.rates @ rates[k]) * one.rates[None]).sum(axis=2).T
-        believed = 1.0 + budget.model_error
-        found = believed * (push[k] * tube.acceleration + turned.max(axis=0))
-        found += (one.rates @ damping.T).max(axis=0)
         for e, value in enumerate(stated):
             if not value >= found[e] - ROUNDING:
                 raise RefusalError(f"{where}[{e}]", f"is {value:.6g}; the budget gives up to {found[e]:.6g}")

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from cmath import cosh, exp, sinh, sqrt
 from collections import deque
+from collections.abc import Iterator
 from math import ceil
 
 import numpy as np
@@ -83,6 +84,37 @@ def position_bounds(tube: PositionTube, stiffness: float, damping: float, budget
     return np.array([value.max() for value in (off, fast, speed, still, single)])
 
 
+def may_rest(tube: PositionTube, stiffness: float, damping: float, budget: Budget, rate: float) -> bool:
+    """Whether the tube holds for an object that begins with all constant errors and a small rate, too.
+
+    Nothing entered the loop before that. So what the tube counts for earlier errors of rates and
+    accelerations must be more than what the rate causes, at every sample, of e, e' and the feedback: the one
+    there is, and the ones of any sign in the measurements that are used first. Constant errors of the
+    position are among those that the tube counts.
+
+    Args:
+        tube: The tube.
+        stiffness: K of the nominal motion [1/s^2].
+        damping: zeta of the nominal motion [1/s].
+        budget: The budget.
+        rate: The rate [m/s].
+    """
+    flow, T = oscillator(stiffness, damping, budget.period), budget.period
+    parts = PARTS if budget.model_error > 0.0 else 1
+    errors = budget.model_error * (np.arange(1, 2 * parts, 2) / parts - 1.0)
+    damper, delay = tube.tracking_damping, ceil(budget.delay / budget.period - 1e-9)
+    caused, entered, recent = [], [], deque[FloatArray](maxlen=delay)
+    for found in _followed(tube, flow, stiffness, damping, budget, errors):
+        sizes = np.abs(found[:3, :3])
+        if delay:
+            recent.append(sizes[COMMAND])
+        caused.append(rate * (sizes[KICK] + damper * np.sum(recent or [0.0 * sizes[COMMAND]], axis=0)))
+        pushed = T * mean_size(found[KICK, :3], found[KICK, :3] + T * found[PLACE, :3])
+        entered.append(damper * budget.velocity_noise * sizes[COMMAND] + budget.acceleration_error * pushed)
+    left = np.flip(np.cumsum(np.flip(entered, 0), axis=0), 0)
+    return bool((np.array(caused)[:-1] <= left[1:] + LEFT).all())
+
+
 def _sums(
     tube: PositionTube,
     flow: FloatArray,
@@ -98,20 +130,38 @@ def _sums(
     The second run's are those to a unit of acceleration at all times, the fourth run's those to a unit of
     speed of p_G; the third run's are not used.
     """
+    T, sums = budget.period, np.zeros((4, 5, len(errors)))
+    for found in _followed(tube, flow, stiffness, damping, budget, errors):
+        sums[[COMMAND, STEP]] += np.abs(found[[COMMAND, STEP]])
+        sums[KICK] += mean_size(found[KICK], found[KICK] + T * found[PLACE])
+    sums[[KICK, STEP]] *= T
+    return sums
+
+
+def _followed(
+    tube: PositionTube,
+    flow: FloatArray,
+    stiffness: float,
+    damping: float,
+    budget: Budget,
+    errors: FloatArray,
+) -> Iterator[FloatArray]:
+    """Yield the responses of ``_sums`` sample by sample, each of shape (4 runs, 5, parts).
+
+    Raises:
+        RefusalError: The loop does not come to rest.
+    """
     T, delay = budget.period, ceil(budget.delay / budget.period - 1e-9)
     p, v, s = np.zeros((3, 4, len(errors)))
     q, w, goal = np.zeros((3, 4, 1))  # the nominal motion and p_G, which only the last run moves
     v[KICK], p[PLACE], goal[STEP] = 1.0, 1.0, 1.0
     past = deque([(0.0 * p, 0.0 * v)] * delay, maxlen=delay + 1)
-    sums = np.zeros((4, 5, len(errors)))
     for k in range(ceil(HORIZON / T)):
         past.append((p - q, v - w))
         old, old_rate = past[0]
         feedback = -tube.tracking_stiffness * old - tube.tracking_damping * old_rate
         nominal = -stiffness * (q - goal) - damping * w
-        found = np.stack(np.broadcast_arrays(p - q, v - w, feedback, nominal, w), axis=1)
-        sums[[COMMAND, STEP]] += np.abs(found[[COMMAND, STEP]])
-        sums[KICK] += mean_size(found[KICK], found[KICK] + T * found[PLACE])
+        yield np.stack(np.broadcast_arrays(p - q, v - w, feedback, nominal, w), axis=1)
         command = feedback + nominal
         if k == 0:
             command[COMMAND] += 1.0
@@ -119,8 +169,6 @@ def _sums(
         q, w = goal + flow[0, 0] * (q - goal) + flow[0, 1] * w, flow[1, 0] * (q - goal) + flow[1, 1] * w
     if not max(np.abs(p - q).max(), np.abs(v - w).max()) < LEFT:
         raise RefusalError("tube.tracking_stiffness", f"the position has not come to rest after {HORIZON} s")
-    sums[[KICK, STEP]] *= T
-    return sums
 
 
 def mean_size(first: FloatArray, last: FloatArray) -> FloatArray:

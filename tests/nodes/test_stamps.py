@@ -1,0 +1,114 @@
+"""Measurements say when they were made: robots and drives compare this with what the plan holds for."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from coop_drake.answers.budget import Budget
+from coop_drake.messages import Effort, Reason
+from coop_drake.messages.outgoing import Links
+from coop_drake.nodes import DirectExchange, simulate_apart
+from coop_drake.nodes.pacing import Pacing
+from coop_drake.nodes.sample_exchange import SampleExchange
+from coop_drake.nodes.stamps import StampCheck, certified_age
+from coop_drake.scenario import Measurements
+from tests.nodes.test_sample_exchange import MEASURED, PERIOD, Team
+from tests.nodes.test_stops_under_a_budget import transport  # noqa: F401
+from tests.support.sampled_team import sampled
+from tests.support.small_loop import small_maps
+
+T = 0.005
+BUDGET = Budget(control_rate=200.0, delay=0.012)
+
+
+def asked(stamps, time=1.0, number=200, budget=BUDGET, age=0.01):
+    return StampCheck(T, budget, age).doubts(number, time, stamps)
+
+
+def test_measurements_are_as_old_as_the_robot_takes_them_for():
+    assert certified_age(BUDGET) == pytest.approx(0.015)
+    assert not asked((0.99, 0.99))
+    assert not asked((0.0, 0.0), time=T, number=1)  # nothing is older than the start
+    for stamps in ((0.985, 0.99), (0.99, 0.985), (0.995, 0.995), (1.005, 0.99), (0.9898, 0.99)):
+        assert asked(stamps)
+    assert not asked((0.5, 2.0), budget=None)
+
+
+def test_no_more_than_the_budgets_delay_is_allowed():
+    assert asked((0.98, 0.98), age=0.02)
+    assert not asked((0.98, 0.98), age=0.02, budget=replace(BUDGET, delay=0.02))
+
+
+@pytest.mark.parametrize(
+    ("times", "jumps"),
+    [((1.0, 1.005, 1.010), False), ((1.0, 1.005, 1.012), True), ((1.0, 1.005, 1.006), True)],
+)
+def test_a_clock_that_jumps_is_seen_by_the_numbers_of_samples(times, jumps):
+    check = StampCheck(T, BUDGET, 0.01)
+    doubts = [check.doubts(200 + k, time, (time - 0.01, time - 0.01)) for k, time in enumerate(times)]
+    assert doubts == [False, False, jumps]
+
+
+class Watching(DirectExchange):
+    """Keeps the time and the stamps of robot 0 at every sample."""
+
+    def __init__(self):
+        super().__init__()
+        self.seen = []
+
+    def step(self, time, measured, stamps=None):
+        self.seen.append((time, *stamps[0]))
+        return super().step(time, measured, stamps)
+
+
+def test_stamps_are_set_when_measured_and_go_through_all_that_delays_or_loses_a_measurement():
+    scenario, plan = sampled("base", measurements=Measurements(delay=0.02, loss=0.2))
+    exchange = Watching()
+    simulate_apart(scenario, plan, small_maps(), exchange=exchange)
+    time, pose, state = np.array(exchange.seen).T
+    for stamp in (pose, state):
+        missing = np.maximum(time - 0.02, 0.0) - stamp
+        assert (np.diff(stamp) >= 0.0).all()
+        assert missing.min() >= -1e-12
+        assert 0.7 < (missing < 1e-12).mean() < 0.9
+        assert missing / 0.01 == pytest.approx(np.round(missing / 0.01), abs=1e-9)
+    assert (pose != state).any()
+
+
+class LateExchange(DirectExchange):
+    """From a time on, every measurement is some samples older than it was before; its stamps say so."""
+
+    def __init__(self, begin, samples):
+        super().__init__()
+        self.begin, self.samples, self.past = begin, samples, []
+
+    def step(self, time, measured, stamps=None):
+        self.past.append(([*measured], [*stamps]))
+        late = self.samples if time >= self.begin else 0
+        return super().step(time, *self.past[max(0, len(self.past) - 1 - late)])
+
+
+def test_a_team_whose_measurements_come_later_than_its_plan_allows_rests_and_says_why(transport):  # noqa: F811
+    scenario, plan, maps, _ = transport
+    exchange = LateExchange(0.8, 3)
+    log = simulate_apart(scenario, plan, maps, exchange=exchange)
+    assert not log.reached
+    assert "robot 0 and robot 1 cannot go on: measurements are older than the plan allows" in log.violation
+    assert "without contact" in log.violation
+    (stop,) = exchange.membership.stops
+    assert 0.85 < stop.since < 0.88  # it has asked for a hold before
+    assert np.abs(log.object_twist[-1]).max() < 0.05
+
+
+def test_drives_take_no_effort_that_rests_on_measurements_of_the_future_or_of_long_ago():
+    team = Team()
+    exchange = SampleExchange(team, 1, Links(period=PERIOD), pacing=Pacing(allowed=0.01), oldest=0.02)
+    exchange.damping = [np.ones(3)]
+    exchange.look(0.0, MEASURED)
+    assert exchange.step(0.0, MEASURED)[0][0] == 0.0
+    for stamp in (0.5, -0.1, float("nan")):
+        before = team.refusals.counts[Reason.STAMP]
+        exchange._keep(0, Effort(0, stamp, 0, 0, (9.0, 9.0, 9.0)), admits=True)
+        assert team.refusals.counts[Reason.STAMP] == before + 1
+    assert exchange.step(PERIOD, MEASURED)[0][0] == 1.0
