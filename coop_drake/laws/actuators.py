@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import exp, hypot
+from math import copysign, exp, hypot, inf
 
 from coop_drake.compiled import compiled
 from coop_drake.tree.pose import FloatArray
@@ -16,10 +16,14 @@ def limit_efforts(limits: FloatArray, efforts: FloatArray) -> None:
         limits: Largest length of the base's force, largest torque, largest efforts of the joints, (2 + n,).
         efforts: Base wrench and joint torques, shape (3 + n,) [N, N m]; those that are too large change.
     """
-    force = hypot(efforts[0], efforts[1])
-    if force > limits[0]:
-        efforts[0] *= limits[0] / force
-        efforts[1] *= limits[0] / force
+    if hypot(efforts[0], efforts[1]) > limits[0]:
+        largest = max(abs(efforts[0]), abs(efforts[1]))
+        for i in range(2):  # a lost run may ask for infinite forces
+            finite = efforts[i] / largest if largest < inf else 0.0
+            efforts[i] = copysign(1.0, efforts[i]) if abs(efforts[i]) == inf else finite
+        shorter = limits[0] / hypot(efforts[0], efforts[1])
+        efforts[0] *= shorter
+        efforts[1] *= shorter
     for i in range(1, limits.size):
         efforts[1 + i] = min(max(efforts[1 + i], -limits[i]), limits[i])
 

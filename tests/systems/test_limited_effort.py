@@ -21,7 +21,8 @@ def test_ports():
 
 
 def test_a_force_is_limited_by_its_length_and_keeps_its_direction():
-    np.testing.assert_allclose(given([6.0, -8.0, 0.0, 0.0]), [3.0, -4.0, 0.0, 0.0], rtol=1e-15)
+    np.testing.assert_allclose(given([6.0, -8.0, 0.0, 0.0]), [3.0, -4.0, 0.0, 0.0], rtol=1e-14)
+    np.testing.assert_array_equal(given([2.0, -np.inf, 0.0, np.inf]), [0.0, -5.0, 0.0, 0.5])
     np.testing.assert_array_equal(given([4.0, 3.0, 0.0, 0.0]), [4.0, 3.0, 0.0, 0.0])
 
 
