@@ -6,7 +6,8 @@ import inspect
 import struct
 from typing import Any
 
-from coop_drake.messages.agreement import REASONS
+from coop_drake.laws.braking import BASE_RATE, JOINT_DAMPING, RETURN_RATE, TURN_RATE
+from coop_drake.messages.agreement import OTHER_VERSION, REASONS
 from coop_drake.messages.codec import (
     LONGEST,
     MAGIC,
@@ -19,7 +20,10 @@ from coop_drake.messages.codec import (
 from coop_drake.messages.refusals import Reason
 from coop_drake.messages.schema import MOST_ROBOTS, SUPERVISOR, WORLD
 from coop_drake.messages.wire import KINDS, MOST_ITEMS, Kind
+from coop_drake.nodes.membership import TOLERATED
+from coop_drake.nodes.robot_node import LONGEST_DOUBT
 from coop_drake.scenario.json_schema import field_meanings
+from coop_drake.systems.team_link import robot_record
 
 __all__ = ["message_page"]
 
@@ -94,7 +98,51 @@ def message_page() -> str:
     for channel, (title, about) in _CHANNELS.items():
         parts += [f"## {title}", "", about, ""]
         parts += [_message(cls, kind) for cls, kind in KINDS.items() if kind.channel == channel]
-    return "\n".join([*parts, _reasons()]).replace("``", "`")
+    return "\n".join([*parts, _world(), _reasons()]).replace("``", "`")
+
+
+def _world() -> str:
+    """Return what who builds another world needs to know beside the messages."""
+    record = robot_record(1, holds=True, monitored=True)
+    shown = ", ".join(f"`{name}` ({size})" for name, size in record.items())
+    per_mass, per_inertia = f"{BASE_RATE:.4g}", f"{TURN_RATE:.4g}"
+    return f"""## Building a world
+
+A world is the server of the channels of measurements and of efforts, with `Hello` and `Welcome` on each.
+
+- **Samples** are numbered from 0, one more in every control period, and the first one is that of time 0, at
+  which the team rests at the plan's start. A process whose first question has another number was started
+  during a run: it asks for its cell with `Place`. Questions with `step` 0 change nothing, and ask for
+  telemetry alone.
+- **Time** is the world's. `time` is what the robot's clock shows at the sample, number times period where
+  its clock is right. In lock-step the world's time waits for all answers, and for nothing else; by the wall
+  clock a sample is sent no earlier than at its time.
+- **Stamps** are the times, by the same clock, at which the pose and the state were measured: measurements
+  that are handed out m periods later have stamps m periods before `time`, and those of the first m samples
+  have 0. Under a budget a robot compares them at every step. A measurement that is older or younger than it
+  takes it for, by the delay of the scenario in whole periods, or older than the budget's delay, a stamp
+  that goes back, and a clock that jumps let it ask for a hold, and after {LONGEST_DOUBT:g} s let the drives
+  brake. Drives take no effort whose `stamp` is in the future of its sample, or older by more than
+  {TOLERATED:g} s than the budget's delay.
+- **Efforts** act on the base at the origin of Bk as (force along x of W, force along y of W, torque about
+  z), then on the joints in the order of q_k. They hold from the sample's time on until the next ones.
+- **Present** is the client's first message of every session, sent at once. It need not be sent again; the
+  world sends it to see whether a connection is there. A process ends when it has heard nothing of the world
+  for 30 s.
+- **Telemetry** has these values in their order, here for one joint, with the numbers of values: {shown}.
+  `clock` is there in teams that can be held, `alarm` under a budget; `funnels` has the lower, then the
+  upper bounds of (theta, q_k).
+- **Braking**, where `stopped` is 1 or no effort comes in time: effort = -D (z' + {RETURN_RATE:g} /s (z -
+  rest)), with `rest` of the last `Effort` that had one, else effort = -D z'. D is {per_mass} /s times the
+  base's mass for both forces, {per_inertia} /s times its inertia about z through the origin of Bk for the
+  torque, and {JOINT_DAMPING:g} N m s/rad or N s/m for every joint. Differences of angles are taken in [-pi,
+  pi).
+- **The line** of the emergency stop is closed at the first sample in which all robots have answered with
+  the states 0, 1 or 5.
+- **Versions**: headers of messages that open a session, the nonce of `Hello` and all of `TurnedAway` are
+  the same in all versions. Who speaks another one is answered by `TurnedAway` with reason {OTHER_VERSION},
+  in its own version.
+"""
 
 
 def _message(cls: Any, kind: Kind) -> str:
