@@ -36,7 +36,7 @@ ARMS = {
     "half endless slide": (
         jointed("prismatic", "1 0 0", "<limit><lower>0</lower></limit>"),
         "robot_0::joint_0",
-        "two finite limits",
+        "the lower limit 0 alone",
     ),
     "locked joint": (
         jointed("revolute", more="<limit><lower>1</lower><upper>1</upper></limit>"),
@@ -316,4 +316,4 @@ def test_limits_as_far_as_files_write_for_none_count_as_none(tmp_path):
     endless = jointed("revolute", more="<limit><lower>-1e16</lower><upper>1e16</upper></limit>")
     team, _builder = team_of(load_scenario(write_with_robot(tmp_path, endless)))
     joint = read_component_tree(team).joints[0]
-    assert (joint.lower, joint.upper) == (-math.pi, math.pi)
+    assert (joint.lower, joint.upper) == (-math.inf, math.inf)
