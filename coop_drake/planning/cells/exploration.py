@@ -243,20 +243,26 @@ class Exploration(Subdivision):
     def _note_ends(self, index: int, intervals: Intervals) -> None:
         """Record which cells of a new leaf hold the start, and in which a path may end.
 
-        That is all that share a point with the goal; of those that are free the ones with room for an end.
+        That is all that share a point with the goal. Free ones hold its middle, or else have room for an end
+        in a slice about the middle's angles, in which the middle's position is not free.
         """
         cells, problem, circular = self.graph.by_slice[index], self._problem, self.slices.circular
         start, goal, room = problem.start, problem.goal_pose, problem.position_tolerance
         if holds(intervals, [float(angle) for angle in start[2:]], circular):
             self._starts[index] = [cell for cell in cells if cell.region.holds(start[:2])]
-        if meets(intervals, goal_box(problem), circular):
-            free = self.slices.expanded(intervals)
-            self._goals[index] = [
-                cell.index
-                for cell in cells
-                if cell.region.near(goal[:2], room)
-                and (cell.kind is not Kind.FREE or end_in(problem, free, cell.region) is not None)
+        if not meets(intervals, goal_box(problem), circular):
+            return
+        near = [cell for cell in cells if cell.region.near(goal[:2], room)]
+        ends = [cell.index for cell in near if cell.kind is not Kind.FREE]
+        if holds(intervals, [float(goal[2]), *problem.goal_joints], circular):
+            free, expanded = [c for c in near if c.kind is Kind.FREE], self.slices.expanded(intervals)
+            blocked = not any(c.region.holds(goal[:2]) for c in near if c.kind is Kind.MIXED)
+            ends += [
+                c.index
+                for c in free
+                if c.region.holds(goal[:2]) or (blocked and end_in(problem, expanded, c.region) is not None)
             ]
+        self._goals[index] = ends
 
 
 def _free_weight(region: Region) -> float:
