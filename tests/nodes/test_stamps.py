@@ -80,7 +80,7 @@ class LateExchange(DirectExchange):
     """From a time on, every measurement is some samples older than it was before; its stamps say so."""
 
     def __init__(self, begin, samples):
-        super().__init__()
+        super().__init__([(10**6, 10**6)])  # drives brake where they have to, and the run goes on
         self.begin, self.samples, self.past = begin, samples, []
 
     def step(self, time, measured, stamps=None):
@@ -97,7 +97,7 @@ def test_a_team_whose_measurements_come_later_than_its_plan_allows_rests_and_say
     assert "robot 0 and robot 1 cannot go on: measurements are older than the plan allows" in log.violation
     assert "without contact" in log.violation
     (stop,) = exchange.membership.stops
-    assert 0.85 < stop.since < 0.88  # it has asked for a hold before
+    assert 0.8 < stop.since < 0.88  # after a request for a hold; the monitor may be quicker
     assert np.abs(log.object_twist[-1]).max() < 0.05
 
 
