@@ -394,7 +394,7 @@ def test_a_budget_that_is_not_required_is_the_scenarios_own_or_said_not_to_be():
     ("changes", "where"),
     [
         ({"rotors": (100.0, 100.0)}, "budget.rotors"),
-        ({"bodies": (), "bases": (), "base_force": None, "rotors": (1.0, 0.0)}, "budget.rotors"),
+        ({"bodies": (), "bases": (), "rotors": (1.0, 0.0), **dict.fromkeys(LIMITS)}, "budget.rotors"),
         ({"bodies": ((0.0, 1.0, 0.0, 0.0, 1.0, 1.0),)}, "budget.bodies"),
         ({"bases": ((1.0, 0.0, 0.0), (2.0, 0.0, 0.0))}, "budget.bases"),
         ({"base_force": 2000.0}, "budget.base_force"),
