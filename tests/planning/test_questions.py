@@ -11,6 +11,7 @@ from coop_drake.answers.problem import LIMIT_ROOM, PlanningProblem
 from coop_drake.errors import PlanError
 from coop_drake.laws import ScheduledGains
 from coop_drake.planning.boxes.channel import Channel, NoChannel
+from coop_drake.planning.execution.estimate import timed
 from coop_drake.planning.planner import plan
 from coop_drake.planning.search.search import find_channel
 from coop_drake.tree.component_tree import Body, Component, ComponentTree, TreeJoint
@@ -130,7 +131,9 @@ def test_the_margin_grows_and_shrinks_with_the_scene(kind, scale: float) -> None
 
 @pytest.mark.parametrize("scale", [1e-3, 1000.0])
 def test_a_transport_is_planned_and_verified_in_any_unit(scale: float) -> None:
+    """Gains have bounds in metres: the largest and the smallest teams move slowly, and their plans say so."""
     problem = Similarity(scale=scale).question(case("base"))
+    problem = replace(problem, settings=replace(problem.settings, max_transition_time=1000.0))
     found = plan(problem, ScheduledGains(), gain_set_name="scheduled")
     assert isinstance(found, Found)
     verify_plan(found.plan, problem, {"scheduled": ScheduledGains()})
@@ -143,8 +146,8 @@ def test_a_limit_refuses_a_plan_at_another_scale_too() -> None:
     assert isinstance(answer, BeyondLimits)
     (refusal,) = answer.plan.refused_by
     assert (refusal.limit, refusal.allowed) == ("planner.max_transition_time", 1.0)
-    assert refusal.value == pytest.approx(max(t.estimated_time for t in answer.plan.transitions))
-    assert 1.0 < refusal.value < 10.0
+    assert refusal.value == pytest.approx(max(t.estimated_time for t in timed(answer.plan).transitions))
+    assert refusal.value > 1.0
 
 
 @pytest.mark.parametrize("scale", [0.1, 1000.0])

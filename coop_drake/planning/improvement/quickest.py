@@ -14,7 +14,7 @@ from coop_drake.laws import GainSet
 from coop_drake.planning.boxes.channel import Channel, CoveredPath
 from coop_drake.planning.execution.channel_ends import check_ends, turned_to_start
 from coop_drake.planning.execution.channel_path import path_through
-from coop_drake.planning.execution.estimate import estimated, plan_time
+from coop_drake.planning.execution.estimate import estimated, plan_time, timed
 from coop_drake.planning.execution.speed_shares import NEED_FACTOR, limits_of
 from coop_drake.planning.execution.transitions import keep_limits, make_plan, with_gains
 from coop_drake.planning.improvement.path_covering import cover_path
@@ -71,7 +71,8 @@ def quickest_plan(
         raise
     except (GeometryError, PlanError, StallError) as error:
         raise StallError(f"{error} (these lengths are to be multiplied by {unit:g})") from error
-    plan = with_gains(scale.plan(made), gain_set, gain_set_name)
+    # Gains have bounds in metres: a team of another size moves at another pace than in its usual unit.
+    plan = timed(with_gains(scale.plan(made), gain_set, gain_set_name))
     return replace(keep_limits(problem, plan, gain_set), problem=problem_digest(problem))
 
 
