@@ -105,7 +105,8 @@ def test_a_factor_beyond_what_the_model_may_err_is_refused(tmp_path):
 
 def test_a_budget_with_more_than_can_be_simulated_has_no_breaking_points(tmp_path):
     (tmp_path / "own.budget.yaml").write_text("{axes: false, report_age: 11.0}")
-    section = {**CERTIFIED, "budget": "own.budget.yaml"}
+    without_limit = {**CERTIFIED["set"], "deployment.actuators.base_force": None}
+    section = {**CERTIFIED, "set": without_limit, "budget": "own.budget.yaml"}
     assert "breaking.budget: " in refused(tmp_path, breaking=section)
 
 

@@ -114,7 +114,7 @@ def test_each_departure_has_its_reason(data, reason):
 
 def test_a_length_that_counts_more_than_there_is_is_refused_before_it_is_read():
     data = bytearray(encode(Effort(1, 0.0, 0, 0, (1.0, 2.0)), 0, 1, 1))
-    struct.pack_into("<H", data, header_of(data).size + 9, 65535)
+    struct.pack_into("<H", data, header_of(data).size + 17, 65535)
     with pytest.raises(RefusedError) as refused:
         read(bytes(data))
     assert refused.value.reason is Reason.LENGTH

@@ -112,10 +112,13 @@ def test_slower_motion_is_chosen_where_accelerations_are_limited():
     problem, gains = planning_problem(scenario), ScheduledGains()
     accelerations = commanded_accelerations(problem, plan, gains, BUDGET)
     assert accelerations == sorted(set(accelerations), reverse=True)
-    found = fit_position(problem, plan, gains, BUDGET, 17.0)
-    assert isinstance(found, Plan)
-    assert found.tube.speed < 1.0
-    assert accelerations[-1] <= found.tube.acceleration <= 17.0
+    speeds = []
+    for most in (accelerations[0], accelerations[-1], 15.0):
+        found = fit_position(problem, plan, gains, BUDGET, most)
+        assert isinstance(found, Plan)
+        assert found.tube.acceleration <= most
+        speeds.append(found.tube.speed)
+    assert speeds[0] > speeds[1] > speeds[2]
 
 
 def test_a_cell_that_is_too_narrow_is_named():
