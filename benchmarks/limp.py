@@ -13,14 +13,13 @@ from benchmarks.rejoining import KILLED, label_of
 from benchmarks.rows import Row
 from benchmarks.tasks import Task
 from coop_drake import Plan, load_scenario
-from coop_drake.diagram import build_station, control_period
+from coop_drake.diagram import brakes_of, build_station, control_period
 from coop_drake.fields import HarmonicMap
-from coop_drake.laws.braking import braking_damping, braking_effort
+from coop_drake.laws.braking import braking_effort
 from coop_drake.messages import SUPERVISOR
 from coop_drake.nodes.membership import TOLERATED
 from coop_drake.nodes.one_process import DirectExchange, simulate_apart
 from coop_drake.nodes.stillness import Stillness
-from coop_drake.plant.team import base_inertia
 from coop_drake.scenario import Control, Floor, Hold, Scenario
 from coop_drake.tree.pose import FloatArray
 
@@ -49,8 +48,7 @@ class LimpExchange(DirectExchange):
     def __init__(self, scenario: Scenario, robot: int, fault: float, *, brakes: bool) -> None:
         super().__init__()
         self._robot, self._fault, self._brakes = robot, fault, brakes
-        team = build_station(scenario).team
-        self._damping = [braking_damping(*base_inertia(own), len(own.joints)) for own in team.robots]
+        self._brakes = brakes_of(scenario, build_station(scenario).team)
         self._still, self._failed, self._rests = Stillness(control_period(scenario)), False, False
 
     def step(
@@ -65,7 +63,9 @@ class LimpExchange(DirectExchange):
             np.concatenate([own[(len(own) - 3) // 2 : -3] for own in measured])
         )
         if self._brakes and time >= self._fault + TOLERATED:
-            efforts = [braking_effort(own[:-3], d) for own, d in zip(measured, self._damping, strict=True)]
+            efforts = [
+                braking_effort(own[:-3], brake) for own, brake in zip(measured, self._brakes, strict=True)
+            ]
         efforts[self._robot] = np.zeros_like(efforts[self._robot])
         return efforts
 

@@ -9,7 +9,7 @@ from coop_drake.diagram.robot_controller import (
     build_robot_controller,
 )
 from coop_drake.diagram.station import TransportStation, build_station
-from coop_drake.diagram.world import World, build_world, control_period
+from coop_drake.diagram.world import World, brakes_of, build_world, control_period
 
 __all__ = [
     "TELEMETRY",
@@ -20,6 +20,7 @@ __all__ = [
     "RobotKnowledge",
     "TransportStation",
     "World",
+    "brakes_of",
     "build_closed_loop",
     "build_robot_controller",
     "build_station",

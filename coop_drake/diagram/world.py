@@ -12,8 +12,12 @@ from coop_drake.diagram.deployment import Body, build_body
 from coop_drake.diagram.knowledge import hold_of
 from coop_drake.diagram.loop import Loop
 from coop_drake.diagram.station import build_station
+from coop_drake.diagram.wrapping import effort_limits
 from coop_drake.errors import ScenarioError
+from coop_drake.laws.braking import Brake, braking_damping
+from coop_drake.plant import TeamPlant
 from coop_drake.plant.configuration import displacement
+from coop_drake.plant.team import base_inertia
 from coop_drake.scenario import Scenario
 from coop_drake.systems import Exchange, TeamLink, robot_record, supervisor_record
 
@@ -63,6 +67,17 @@ def record_sizes(scenario: Scenario, plan: Plan, joints: Sequence[int]) -> tuple
     holds = hold_of(scenario, plan) is not None
     robots = (robot_record(n, holds=holds, monitored=plan.alarms is not None) for n in joints)
     return (*robots, supervisor_record(len(joints), holds=holds))
+
+
+def brakes_of(scenario: Scenario, team: TeamPlant) -> list[Brake]:
+    """Return how the drives of each robot brake, with no more than its actuators can give."""
+    return [
+        Brake(
+            braking_damping(*base_inertia(robot), len(robot.joints)),
+            effort_limits(scenario.deployment, len(robot.joints)),
+        )
+        for robot in team.robots
+    ]
 
 
 def build_world(scenario: Scenario, plan: Plan, exchange: Exchange) -> World:

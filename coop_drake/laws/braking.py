@@ -7,12 +7,17 @@ Where a robot has told its drives a rest, they pull towards it, too, z being the
 Damper and spring take energy out of the team whatever its masses are, for -D z' has negative power and the
 spring has a potential. All robots follow the same nominal motion and so name rests that fit each other: the
 team comes to rest where this motion was, which is inside its cell.
+
+Drives that are limited cut the damper's part and the spring's part to half of each limit, so that their sum
+is never beyond it. Cut by itself, the damper still has negative power, and the spring a potential.
 """
 
 from math import pi, tau
+from typing import NamedTuple
 
 import numpy as np
 
+from coop_drake.laws.actuators import limit_efforts
 from coop_drake.tree.pose import FloatArray
 
 BASE_RATE = 100.0 / 6.0
@@ -33,6 +38,19 @@ RETURN_RATE = 4.0
 than it would coast."""
 
 
+class Brake(NamedTuple):
+    """How the drives of one robot brake.
+
+    Attributes:
+        damping: D, from :func:`braking_damping`, shape (3 + n,).
+        limits: Largest length of the base's force, largest torque and largest efforts of the joints, infinite
+            for none, shape (2 + n,) [N, N m].
+    """
+
+    damping: FloatArray
+    limits: FloatArray
+
+
 def braking_damping(mass: float, inertia: float, joints: int) -> FloatArray:
     """Return base wrench and joint torques for each unit of the rates, shape (3 + n,).
 
@@ -44,19 +62,23 @@ def braking_damping(mass: float, inertia: float, joints: int) -> FloatArray:
     return np.array([BASE_RATE * mass, BASE_RATE * mass, TURN_RATE * inertia, *[JOINT_DAMPING] * joints])
 
 
-def braking_effort(state: FloatArray, damping: FloatArray, rest: FloatArray | None = None) -> FloatArray:
-    """Return base wrench and joint torques that brake a robot, shape (3 + n,) [N, N m].
+def braking_effort(state: FloatArray, brake: Brake, rest: FloatArray | None = None) -> FloatArray:
+    """Return base wrench and joint torques that brake a robot, within its limits, shape (3 + n,) [N, N m].
 
     A team in which all robots brake loses energy, but for the age of measurements, and comes to rest.
 
     Args:
         state: z_k and its rate, shape (2 (3 + n),).
-        damping: D, from :func:`braking_damping`.
+        brake: How its drives brake.
         rest: Where it shall come to rest, z_k of shape (3 + n,); None where that is not known.
     """
-    half = len(state) // 2
+    half, halved = len(state) // 2, 0.5 * brake.limits
+    effort = -brake.damping * state[half:]
+    limit_efforts(halved, effort)
     if rest is None:
-        return -damping * state[half:]
+        return effort
     away = state[:half] - rest
     away[2:] = (away[2:] + pi) % tau - pi  # a rest is never half a turn away; sensors may show any turn
-    return -damping * (state[half:] + RETURN_RATE * away)
+    pull = -RETURN_RATE * brake.damping * away
+    limit_efforts(halved, pull)
+    return effort + pull

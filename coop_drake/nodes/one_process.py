@@ -9,17 +9,16 @@ import numpy as np
 
 from coop_drake.answers.log import SimulationLog
 from coop_drake.answers.plan import Plan
-from coop_drake.diagram import build_world, control_period
+from coop_drake.diagram import brakes_of, build_world, control_period
 from coop_drake.diagram.knowledge import hold_of, robot_knowledge
 from coop_drake.fields import HarmonicMap
-from coop_drake.laws.braking import braking_damping, braking_effort
+from coop_drake.laws.braking import Brake, braking_effort
 from coop_drake.messages import name_of
 from coop_drake.nodes.membership import Membership
 from coop_drake.nodes.robot_node import RobotNode
 from coop_drake.nodes.states import MOVES, RETURNS, STANDS
 from coop_drake.nodes.stillness import Stillness
 from coop_drake.nodes.supervisor_node import SupervisorNode
-from coop_drake.plant.team import base_inertia
 from coop_drake.scenario import Scenario
 from coop_drake.simulation import Sample, run_loop
 from coop_drake.tree.pose import FloatArray
@@ -48,7 +47,7 @@ class DirectExchange:
         self.membership = Membership(
             rejoin=0.0, gone=tuple, revive=lambda index: False, tell=lambda words: None
         )
-        self.damping: Sequence[FloatArray] = ()
+        self.brakes: Sequence[Brake] = ()
         self._gaps, self._number, self._efforts = gaps, 0, list[FloatArray]()
         self._stillness: Stillness | None = None
 
@@ -63,8 +62,8 @@ class DirectExchange:
             self._efforts = self._computed(time, measured, stamps)
         if not self.membership.stopped:
             return self._efforts
-        braked = zip(measured, self.damping, self.robots, strict=True)
-        return [braking_effort(own[:-3], damping, robot.rest) for own, damping, robot in braked]
+        braked = zip(measured, self.brakes, self.robots, strict=True)
+        return [braking_effort(own[:-3], brake, robot.rest) for own, brake, robot in braked]
 
     def _see(self, time: float, measured: Sequence[FloatArray], *, away: bool) -> None:
         """Let the drives brake from the first sample of a gap on."""
@@ -130,9 +129,7 @@ def simulate_apart(
     period, world = control_period(scenario), build_world(scenario, plan, carried)
     deployment = scenario.deployment
     known = robot_knowledge(scenario, plan, maps, world.team)
-    carried.damping = [
-        braking_damping(*base_inertia(robot), len(robot.joints)) for robot in world.team.robots
-    ]
+    carried.brakes = brakes_of(scenario, world.team)
     carried.robots = [RobotNode(own, deployment, k, world.team.robots[k].name) for k, own in enumerate(known)]
     carried.supervisor = SupervisorNode(len(known), len(plan.cells), period, hold_of(scenario, plan))
     try:

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from coop_drake.errors import MessagingError
-from coop_drake.laws.braking import braking_effort
+from coop_drake.laws.braking import Brake, braking_effort
 from coop_drake.messages import (
     SUPERVISOR,
     Effort,
@@ -74,7 +74,7 @@ class SampleExchange:
     Attributes:
         sample: Number of the present sample.
         membership: Who is missing, and whether the drives brake.
-        damping: With which the drives of each robot brake, see ``laws.braking``.
+        brakes: How the drives of each robot brake.
     """
 
     def __init__(
@@ -97,7 +97,7 @@ class SampleExchange:
         self._everyone, self._period = [*range(robots), SUPERVISOR], links.period
         self._clock, self._oldest = links.faults.clock, oldest + _ROUNDING
         self.membership = Membership(tolerated=tolerated, rejoin=rejoin, gone=gone, revive=revive, tell=tell)
-        self.damping: Sequence[FloatArray] = ()
+        self.brakes: Sequence[Brake] = ()
         self.sample, self._still = 0, Stillness(links.period)
         self._last: dict[tuple[int, type], Any] = {}
         self._states = dict[int, int]()
@@ -195,7 +195,7 @@ class SampleExchange:
     def _effort(self, robot: int, measured: FloatArray) -> FloatArray:
         """Return what the drives of a robot do."""
         if self.membership.stopped or (known := self._last.get((robot, Effort))) is None:
-            return braking_effort(measured[:-3], self.damping[robot], self._rests.get(robot))
+            return braking_effort(measured[:-3], self.brakes[robot], self._rests.get(robot))
         return np.array(known.efforts)
 
     def _await(self, time: float, measured: Sequence[FloatArray]) -> None:

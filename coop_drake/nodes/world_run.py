@@ -10,10 +10,9 @@ from typing import Any
 from coop_drake.answers.budget import Budget
 from coop_drake.answers.log import SimulationLog
 from coop_drake.answers.plan import Plan
-from coop_drake.diagram import build_world, control_period
+from coop_drake.diagram import brakes_of, build_world, control_period
 from coop_drake.errors import MessagingError
 from coop_drake.fields import HarmonicMap
-from coop_drake.laws.braking import braking_damping
 from coop_drake.messages import AddressBook, Goodbye, KeyPair, WorldEnd, local_book, name_of
 from coop_drake.messages.faults import NO_FAULTS, Faults
 from coop_drake.messages.outgoing import Links
@@ -24,7 +23,6 @@ from coop_drake.nodes.sample_exchange import PATIENCE, SampleExchange
 from coop_drake.nodes.serving import TURN
 from coop_drake.nodes.stamps import certified_age
 from coop_drake.nodes.states import REJOIN, RESTARTS
-from coop_drake.plant.team import base_inertia
 from coop_drake.progress import Progress
 from coop_drake.scenario import Deployment, Scenario
 from coop_drake.simulation import Sample, run_loop
@@ -103,9 +101,7 @@ def run_world(
         tell=tell,
     )
     world = build_world(scenario, plan, exchange)
-    exchange.damping = [
-        braking_damping(*base_inertia(robot), len(robot.joints)) for robot in world.team.robots
-    ]
+    exchange.brakes = brakes_of(scenario, world.team)
     if pacing is not None:
         gc.freeze()  # To collect garbage among all that was imported takes a tenth of a second.
     try:

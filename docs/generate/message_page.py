@@ -136,7 +136,7 @@ A world is the server of the channels of measurements and of efforts, with `Hell
   rest)), with `rest` of the last `Effort` that had one, else effort = -D z'. D is {per_mass} /s times the
   base's mass for both forces, {per_inertia} /s times its inertia about z through the origin of Bk for the
   torque, and {JOINT_DAMPING:g} N m s/rad or N s/m for every joint. Differences of angles are taken in [-pi,
-  pi).
+  pi). Where actuators have limits, each of the two summands is cut to half of them, the force by its length.
 - **The line** of the emergency stop is closed at the first sample in which all robots have answered with
   the states 0, 1 or 5.
 - **Versions**: headers of messages that open a session, the nonce of `Hello` and all of `TurnedAway` are

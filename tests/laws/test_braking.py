@@ -1,13 +1,21 @@
 """Drives brake with efforts in proportion to the inertia of their robot, against every rate."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from pydrake.systems.framework import DiagramBuilder
 
-from coop_drake.laws.braking import RETURN_RATE, braking_damping, braking_effort
+from coop_drake.diagram import brakes_of
+from coop_drake.laws.braking import RETURN_RATE, Brake, braking_damping, braking_effort
 from coop_drake.plant import build_team_plant
 from coop_drake.plant.team import base_inertia
+from coop_drake.scenario import ActuatorLimits
 from tests.support.small_scenario import small_scenario
+
+FREE = np.full(3, np.inf)
 
 
 def test_the_damping_follows_from_the_model_of_the_base():
@@ -19,28 +27,53 @@ def test_the_damping_follows_from_the_model_of_the_base():
     assert braking_damping(2.0 * mass, 3.0 * inertia, 1) == pytest.approx([200.0, 200.0, 3.0, 1.0])
 
 
+def test_drives_brake_within_the_limits_of_the_scenario_s_actuators():
+    scenario = small_scenario("base")
+    limited = ActuatorLimits(base_force=40.0, joint_effort=3.0)
+    scenario = replace(scenario, deployment=replace(scenario.deployment, actuators=limited))
+    for brake in brakes_of(scenario, build_team_plant(scenario, DiagramBuilder())):
+        assert brake.limits[[0, 2]].tolist() == [40.0, 3.0]
+        fast = np.concatenate([np.zeros(4), [3.0, 4.0, 0.0, 9.0]])
+        assert braking_effort(fast, brake) == pytest.approx([-12.0, -16.0, 0.0, -1.5])
+
+
 def test_the_power_of_braking_is_negative():
     damping = braking_damping(6.0, 0.2, 2)
-    for seed in range(20):
-        state = np.random.default_rng(seed).normal(size=10)
-        assert braking_effort(state, damping) @ state[5:] < 0.0
+    for limits in (np.full(4, np.inf), np.array([20.0, 0.1, 0.2, 3.0])):
+        for seed in range(20):
+            state = np.random.default_rng(seed).normal(size=10)
+            assert braking_effort(state, Brake(damping, limits)) @ state[5:] < 0.0
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    st.lists(st.floats(-50.0, 50.0), min_size=12, max_size=12),
+    st.lists(st.floats(0.1, 300.0), min_size=3, max_size=3),
+)
+def test_a_brake_never_asks_for_more_than_its_limits_wherever_its_rest_is(numbers, limits):
+    brake = Brake(braking_damping(6.0, 0.2, 1), np.array(limits))
+    effort = braking_effort(np.array(numbers[:8]), brake, np.array(numbers[8:]))
+    rounded = 1.0 + 1e-12
+    assert np.hypot(effort[0], effort[1]) <= rounded * limits[0]
+    assert (np.abs(effort[2:]) <= rounded * brake.limits[1:]).all()
 
 
 def test_drives_pull_to_the_rest_that_they_were_told_and_a_turn_of_the_yaw_is_none():
     damping, rest = braking_damping(6.0, 0.2, 1), np.array([1.0, 2.0, 3.1, 0.4])
     still = np.concatenate([rest - [0.0, 0.0, 2.0 * np.pi, 0.0], np.zeros(4)])
-    assert braking_effort(still, damping, rest) == pytest.approx(np.zeros(4), abs=1e-12)
+    assert braking_effort(still, Brake(damping, FREE), rest) == pytest.approx(np.zeros(4), abs=1e-12)
     away = np.concatenate([rest + 0.1, np.zeros(4)])
-    assert braking_effort(away, damping, rest) == pytest.approx(-0.1 * RETURN_RATE * damping)
+    assert braking_effort(away, Brake(damping, FREE), rest) == pytest.approx(-0.1 * RETURN_RATE * damping)
 
 
 def test_two_loads_that_brake_towards_the_rest_of_a_motion_overshoot_less_than_they_would_coast():
-    for mass in (3.0, 8.5, 20.0):
-        damping, T, farthest = braking_damping(6.0, 0.2, 0), 1e-3, []
+    limits = np.array([30.0, 1.0])
+    for mass, limit in ((3.0, FREE[:2]), (8.5, FREE[:2]), (20.0, FREE[:2]), (3.0, limits), (8.5, limits)):
+        brake, T, farthest = Brake(braking_damping(6.0, 0.2, 0), limit), 1e-3, []
         for rest in (np.zeros(3), None):
             state, far = np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0]), 0.0
             for _ in range(6000):
-                state[3:] += T * braking_effort(state, damping, rest) / [mass, mass, 0.2]
+                state[3:] += T * braking_effort(state, brake, rest) / [mass, mass, 0.2]
                 state[:3] += T * state[3:]
                 far = max(far, state[0])
             farthest.append(far)

@@ -5,6 +5,7 @@ from collections import deque
 import numpy as np
 import pytest
 
+from coop_drake.laws.braking import Brake
 from coop_drake.messages import SUPERVISOR, Effort, Present, Refusals, Sample, Status, Telemetry
 from coop_drake.messages.outgoing import Links
 from coop_drake.nodes.pacing import Pacing
@@ -57,7 +58,7 @@ def team():
 @pytest.fixture
 def exchange(team):
     made = SampleExchange(team, 1, Links(period=PERIOD), pacing=Pacing(allowed=0.01), tolerated=0.0)
-    made.damping = [np.ones(3)]
+    made.brakes = [Brake(np.ones(3), np.full(2, np.inf))]
     return made
 
 

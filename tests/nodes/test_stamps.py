@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from coop_drake.answers.budget import Budget
+from coop_drake.laws.braking import Brake
 from coop_drake.messages import Effort, Reason
 from coop_drake.messages.outgoing import Links
 from coop_drake.nodes import DirectExchange, simulate_apart
@@ -104,7 +105,7 @@ def test_a_team_whose_measurements_come_later_than_its_plan_allows_rests_and_say
 def test_drives_take_no_effort_that_rests_on_measurements_of_the_future_or_of_long_ago():
     team = Team()
     exchange = SampleExchange(team, 1, Links(period=PERIOD), pacing=Pacing(allowed=0.01), oldest=0.02)
-    exchange.damping = [np.ones(3)]
+    exchange.brakes = [Brake(np.ones(3), np.full(2, np.inf))]
     exchange.look(0.0, MEASURED)
     assert exchange.step(0.0, MEASURED)[0][0] == 0.0
     for stamp in (0.5, -0.1, float("nan")):
