@@ -48,7 +48,7 @@ class LimpExchange(DirectExchange):
     def __init__(self, scenario: Scenario, robot: int, fault: float, *, brakes: bool) -> None:
         super().__init__()
         self._robot, self._fault, self._brakes = robot, fault, brakes
-        self._brakes = brakes_of(scenario, build_station(scenario).team)
+        self._drives = brakes_of(scenario, build_station(scenario).team)
         self._still, self._failed, self._rests = Stillness(control_period(scenario)), False, False
 
     def step(
@@ -64,7 +64,7 @@ class LimpExchange(DirectExchange):
         )
         if self._brakes and time >= self._fault + TOLERATED:
             efforts = [
-                braking_effort(own[:-3], brake) for own, brake in zip(measured, self._brakes, strict=True)
+                braking_effort(own[:-3], brake) for own, brake in zip(measured, self._drives, strict=True)
             ]
         efforts[self._robot] = np.zeros_like(efforts[self._robot])
         return efforts
