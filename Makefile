@@ -12,7 +12,7 @@ CODE := coop_drake tests benchmarks notebooks docs paper
 # The kernels are small; threads of BLAS would only get into each other's way.
 export OMP_NUM_THREADS ?= 1
 
-.PHONY: environment warm demo test lint lint-types lint-rest bench campaigns notebooks docs gallery clean
+.PHONY: environment warm demo test test-slow test-all lint lint-types lint-rest bench campaigns notebooks docs gallery clean
 
 environment: $(READY_TO_DEVELOP)  ## set up what developing takes
 
@@ -21,7 +21,13 @@ warm: $(WARM)  ## compile what commands call first
 demo: $(WARM)  ## plan, simulate and record the paper's transport
 	$(BIN)/coop-drake run models/base.scenario.yaml
 
-test: $(READY_TO_DEVELOP) $(WARM)  ## run every test, and show which lines none of them runs
+test: $(READY_TO_DEVELOP) $(WARM)  ## run all tests but the slow ones
+	$(BIN)/python -m pytest -n 2 --dist worksteal -m "not slow"
+
+test-slow: $(READY_TO_DEVELOP) $(WARM)  ## run the slow tests
+	$(BIN)/python -m pytest -n 2 --dist worksteal -m slow
+
+test-all: $(READY_TO_DEVELOP) $(WARM)  ## run every test, and show which lines none of them runs
 	$(BIN)/python -m pytest -n 2 --dist worksteal --cov --cov-report=term-missing
 
 lint: $(READY_TO_DEVELOP)  ## formatting, lint, types, direction of imports, documentation; two of them at a time
@@ -59,7 +65,7 @@ $(READY): pyproject.toml constraints.txt
 	touch $@
 
 $(WARM): $(READY)
-	-$(BIN)/coop-drake warm models/base.scenario.yaml
+	-$(BIN)/coop-drake doctor --warm
 	touch $@
 
 # What running takes is installed first, so that `make demo` does not wait for what developing takes.

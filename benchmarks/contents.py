@@ -42,6 +42,6 @@ def show_contents(tasks: Sequence[Task]) -> None:
             table.add_row(topic, str(len(names)), about, ", ".join(parts))
     console = Console(highlight=False)
     console.print(table)
-    console.print("A part: coop-drake bench TOPIC --only PART")
-    console.print(f"Everything: coop-drake bench all, {WHOLE}", soft_wrap=True)
+    console.print("A part: python -m benchmarks TOPIC --only PART")
+    console.print(f"Everything: python -m benchmarks, {WHOLE}", soft_wrap=True)
     console.print("Rows go to out/bench.json as they come; Ctrl-C keeps them.", soft_wrap=True)

@@ -31,7 +31,6 @@ def plan(
     gains: str | None = None,
     *,
     effort: float | None = None,
-    workers: int = 1,
     progress: Progress | None = None,
 ) -> PlanningResult:
     """Find a plan for a scenario or a planning problem, or prove that none exists.
@@ -43,7 +42,6 @@ def plan(
         gains: Name of one of the scenario's gain sets, or a file that holds one; None for the one that the
             scenario selects.
         effort: Work spent on a quicker transport, as a share of the default; None for the question's own.
-        workers: Processes that plan at a time; the answer is the same with any number.
         progress: Called with a stage and the fraction of it that is done.
 
     Returns:
@@ -56,7 +54,7 @@ def plan(
     """
     from coop_drake.planning.planner import plan as plan_problem
 
-    ask = partial(plan_problem, effort=effort, workers=workers, progress=progress)
+    ask = partial(plan_problem, effort=effort, progress=progress)
     if isinstance(question, PlanningProblem):
         return ask(question, ScheduledGains(), gain_set_name=_SCHEDULED)
     from coop_drake.plant import planning_problem

@@ -47,7 +47,6 @@ RUN_KEYS = PLAN_KEYS | {
     "max_wrench_error_n",
     "max_governor_spread_m",
     "messages",
-    "message_bytes",
     "max_map_residual",
     "mapping_wall_seconds",
     "simulated_seconds",
@@ -257,9 +256,9 @@ def test_a_live_run_may_wait_for_a_browser_as_long_as_it_takes(finished, room, t
     assert "live_url" in json.loads(result.stdout)
 
 
-def test_warming_up_leaves_nothing_behind(room, tmp_path, monkeypatch):
+def test_warming_up_leaves_nothing_behind(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    result = invoke("warm", room)
+    result = invoke("doctor", "--warm")
     assert result.exit_code == 0, result.stderr
     assert list(tmp_path.iterdir()) == []
 
@@ -338,7 +337,7 @@ def test_a_file_where_the_results_should_go_is_refused_before_planning(room, tmp
     result = invoke("plan", room, "--out", tmp_path / "taken", "--json")
     assert result.exit_code == 2
     assert (tmp_path / "taken").read_text() == ""
-    below = invoke("schema", "--out", tmp_path / "taken" / "schema.json")
+    below = invoke("show", room, "--out", tmp_path / "taken" / "show.png")
     assert below.exit_code == 2
     assert f"{tmp_path / 'taken'}: a file stands where a folder is needed; expected" in below.output.replace(
         "\n", ""

@@ -7,6 +7,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 import coop_drake
 from tests.support.scenarios import write_scenario
 
@@ -32,6 +34,7 @@ def test_help_imports_nothing_heavy():
     assert called("--help") == ("0", set())
 
 
+@pytest.mark.slow
 def test_planning_and_verifying_import_no_pictures(tmp_path):
     room = write_scenario(tmp_path / "room.scenario.yaml")
     for command in (("plan", room, "--out", tmp_path), ("verify", tmp_path / "plan.json", room)):

@@ -26,6 +26,7 @@ entry_point.main()
 """
 
 
+@pytest.mark.slow
 def test_ctrl_c_after_planning_leaves_the_plan_whole_and_nothing_half_written(tmp_path):
     command = [sys.executable, "-c", INTERRUPTIBLE]
     command += ["run", str(MODELS / "base.scenario.yaml"), "--out", str(tmp_path), "--json"]

@@ -8,10 +8,9 @@ import pytest
 from typer.testing import CliRunner
 
 from coop_drake.cli import app
-from coop_drake.cli.maps import map_cache, map_cells, write_accuracies
 from coop_drake.cli.reporter import Reporter
 from coop_drake.cli.results import ResultFolder
-from coop_drake.cli.task import read_task
+from coop_drake.cli.task import map_cache, map_cells, read_task, write_accuracies
 from coop_drake.errors import FieldError
 from tests.support.scenarios import write_scenario
 from tests.support.small_plan import small_plan
@@ -30,7 +29,7 @@ def task_with(tmp_path, tolerance):
 
 
 def shown(*arguments):
-    result = CliRunner().invoke(app, ["maps", "--json", *arguments])
+    result = CliRunner().invoke(app, ["doctor", "--json", *arguments])
     assert result.exit_code == 0, result.stderr
     return json.loads(result.stdout)
 
@@ -66,13 +65,13 @@ def test_maps_are_kept_unless_fresh_ones_are_asked_for(tmp_path):
 
 
 def test_the_cache_is_shown_and_cleared(tmp_path):
-    assert shown()["maps"] == 0
+    assert shown("--maps")["maps"] == 0
     map_cells(task_with(tmp_path, 1e-7), PLAN, Reporter(machine=True, quiet=True), fresh=False)
-    facts = shown("--clear")
+    facts = shown("--clear-maps")
     assert facts["maps"] == len(PLAN.cells)
     assert facts["size_mb"] > 0.0
     assert facts["folder"].startswith(str(tmp_path / "cache"))
-    assert shown()["maps"] == 0
+    assert shown("--maps")["maps"] == 0
 
 
 def test_the_cache_lies_where_the_system_keeps_caches_unless_named(monkeypatch):

@@ -24,7 +24,6 @@ COMMANDS = {
         "transport.html",
     ),
     "simulate": ("log.npz", "maps.json", "fig11_joints_right.png"),
-    "compare": ("plan.json", "compare.json"),
     "tune": ("plan.json", "gains.yaml", "trials.json"),
     "why": ("why.png", "why.svg"),
     "watch": ("think.html", "think_0001.png"),

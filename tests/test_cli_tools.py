@@ -1,4 +1,4 @@
-"""Commands round the chain: help with examples, completion, doctor, schema, show, bench; quiet when piped."""
+"""Commands round the chain: help, examples, old names, completion, doctor, schema, show; quiet when piped."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ import coop_drake
 from coop_drake.answers import save_plan
 from coop_drake.answers.digest import problem_digest
 from coop_drake.cli import app, doctor, show
-from coop_drake.cli.examples import EXAMPLES
+from coop_drake.cli.app import _OLD_NAMES, _PANELS
 from coop_drake.cli.options import complete_gains, complete_scenario
 from coop_drake.cli.task import Task
 from coop_drake.scenario import dump_scenario, load_scenario
@@ -43,27 +43,44 @@ BLIND = {"no number", "an infinity", "a negative infinity"}
 
 
 def test_every_command_has_examples_and_its_help_shows_them():
-    for name, command in COMMAND.commands.items():
-        assert f"coop-drake {name}" in command.epilog
-    for name, examples in EXAMPLES.items():
+    assert len(COMMAND.commands) == sum(map(len, _PANELS.values()))
+    for module in (module for modules in _PANELS.values() for module in modules):
+        name = module.__name__.rpartition(".")[2].replace("_", "-")
         text = " ".join(invoke(name, "--help", COLUMNS="300").output.split())
-        for line, what in examples:
+        for line, what in module.EXAMPLES:
             assert f"coop-drake {line}" in text
             assert what in text
 
 
+@pytest.mark.parametrize(("words", "now"), _OLD_NAMES.items(), ids=lambda value: " ".join(value))
+def test_an_old_name_says_the_new_one(words, now):
+    command, part = words
+    result = invoke(command, *([f"{part}=3" if part == "--workers" else part] if part else ()), COLUMNS="300")
+    assert result.exit_code == 2
+    assert result.stdout == ""
+    assert f"`{' '.join(words).strip()}` is now {now}." in " ".join(result.stderr.split())
+
+
 def test_help_keeps_what_stands_in_brackets():
     """Words in brackets are markup to the table of options, which drops them: units are spelt out."""
-    for name, command in COMMAND.commands.items():
+    named = {**COMMAND.commands}
+    for group in [one for one in named.values() if hasattr(one, "commands")]:
+        named |= group.commands
+    for name, command in named.items():
         for parameter in command.params:
             assert "[" not in (getattr(parameter, "help", None) or ""), (name, parameter.name)
 
 
-@pytest.mark.parametrize("line", [line for examples in EXAMPLES.values() for line, _ in examples])
+@pytest.mark.parametrize(
+    "line", [line for modules in _PANELS.values() for module in modules for line, _ in module.EXAMPLES]
+)
 def test_examples_are_commands_as_they_are(line):
     name, *arguments = shlex.split(line)
-    context = COMMAND.commands[name].make_context(name, arguments)
-    scenario = context.params.get("scenario")
+    command = COMMAND.commands[name]
+    if hasattr(command, "commands"):
+        first = arguments[0] if arguments[0] in command.commands else next(iter(command.commands))
+        command, arguments = command.commands[first], arguments[arguments[0] == first :]
+    scenario = command.make_context(name, arguments).params.get("scenario")
     assert scenario is None or scenario in TYPED
 
 
@@ -106,6 +123,7 @@ def test_the_schema_holds_for_every_shipped_scenario_and_for_all_that_is_spelt_o
         validator.validate(parse(dump_scenario(load_scenario(path))))
 
 
+@pytest.mark.slow
 def test_the_schema_refuses_what_departs_from_it():
     validator = jsonschema.Draft202012Validator(scenario_schema())
     whole = parse(dump_scenario(load_scenario(MODELS / "base.scenario.yaml")))
@@ -124,12 +142,9 @@ def test_every_key_of_the_schema_says_what_it_means():
     assert list(silent(scenario_schema(), ())) == []
 
 
-def test_the_schema_is_written_to_a_file_or_to_standard_output(tmp_path):
-    path = tmp_path / "scenario.schema.json"
-    said = invoke("schema", "--out", path)
-    assert said.exit_code == 0
-    assert "# yaml-language-server: $schema=" in said.output
-    assert json.loads(path.read_text()) == json.loads(invoke("schema").output) == scenario_schema()
+def test_the_schema_in_the_repository_is_that_of_the_types():
+    """`python -m coop_drake.scenario.json_schema` prints it."""
+    assert json.loads((MODELS / "scenario.schema.json").read_text()) == scenario_schema()
 
 
 def test_the_doctor_finds_nothing_wrong_here(tmp_path, monkeypatch):
@@ -186,26 +201,12 @@ def test_no_other_kind_of_picture(tmp_path):
     assert "neither in .png nor in .svg" in " ".join(result.output.split())
 
 
-@pytest.mark.parametrize(("command", "package"), [("bench", "benchmarks"), ("reproduce", "paper")])
-def test_what_only_a_clone_has_is_an_error_that_says_so(tmp_path, monkeypatch, command, package):
+def test_what_only_a_clone_has_is_an_error_that_says_so(tmp_path, monkeypatch):
     monkeypatch.setattr(coop_drake, "__file__", str(tmp_path / "coop_drake" / "__init__.py"))
-    result = invoke(command)
+    result = invoke("reproduce")
     assert result.exit_code == 2
-    assert f"{package}: not found" in result.stderr
+    assert "paper: not found" in result.stderr
     assert "a clone of the repository" in " ".join(result.stderr.split())
-
-
-@pytest.mark.parametrize(("asked", "passed_on"), [([], ["--list"]), (["all"], ["all"])])
-def test_benchmarks_alone_are_listed(monkeypatch, asked, passed_on):
-    commands = []
-
-    def run(command, **_):
-        commands.append(command)
-        return subprocess.CompletedProcess(command, 0)
-
-    monkeypatch.setattr(subprocess, "run", run)
-    assert invoke("bench", *asked).exit_code == 0
-    assert commands == [[sys.executable, "-m", "benchmarks", *passed_on]]
 
 
 SHOWS = """

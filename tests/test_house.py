@@ -1,4 +1,4 @@
-"""The house: captions, sorted names, file sizes, and a planning side that knows nothing of Drake."""
+"""The house: captions, sorted names, and a planning side that knows nothing of Drake."""
 
 from __future__ import annotations
 
@@ -14,7 +14,6 @@ import pytest
 ROOT = Path(__file__).parents[1]
 HOUSE = ROOT / "coop_drake"
 ROOMS = sorted(path.parent for path in [*HOUSE.glob("*/__init__.py"), ROOT / "paper" / "__init__.py"])
-FILES = sorted([*HOUSE.rglob("*.py"), *(ROOT / "paper").rglob("*.py")])
 WITHOUT_DRAKE = [
     "errors",
     "tree",
@@ -29,12 +28,6 @@ WITHOUT_DRAKE = [
     "floor_plans",
     "messages",
 ]
-
-
-def test_the_rooms_are_all_there():
-    names = {room.name for room in ROOMS}
-    assert names >= {"geometry", "planning", "fields", "laws", "scenario", "plant", "systems", "diagram"}
-    assert names >= {"simulation", "viz", "cli"}
 
 
 @pytest.mark.parametrize("room", ROOMS, ids=lambda room: room.name)
@@ -67,16 +60,9 @@ def listed_names(room):
     return names
 
 
-@pytest.mark.parametrize("path", FILES, ids=lambda path: str(path.relative_to(ROOT)))
-def test_a_file_holds_one_algorithm_on_at_most_600_lines(path):
-    text = path.read_text()
-    assert ast.get_docstring(ast.parse(text))
-    assert len(text.splitlines()) <= 600
-
-
-@pytest.mark.parametrize("room", WITHOUT_DRAKE)
-def test_the_planning_side_imports_without_drake(room):
-    code = f"import sys; from coop_drake.{room} import *; sys.exit('pydrake' in sys.modules)"
+def test_the_planning_side_imports_without_drake():
+    rooms = "; ".join(f"from coop_drake.{room} import *" for room in WITHOUT_DRAKE)
+    code = f"import sys; {rooms}; sys.exit('pydrake' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
 
 

@@ -23,6 +23,7 @@ def test_a_notebook_is_committed_without_output(path):
     assert all(not cell.outputs and cell.execution_count is None for cell in code_cells(path))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
 def test_a_notebook_ends_in_an_assertion_that_holds(path):
     assert "assert " in code_cells(path)[-1].source

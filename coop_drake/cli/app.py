@@ -1,12 +1,12 @@
-"""The commands and the headings that the help lists them under.
+"""The commands, the headings that the help lists them under, and what commands of before are called now.
 
 A command is a function in the module of its name: ``coop-drake plan`` is ``plan_command`` in ``plan.py``; one
-with commands of its own is a ``Typer``.
+with commands below it is a ``Typer``. The module lists examples of it in ``EXAMPLES``, which its help shows.
 It imports Drake, the planner and matplotlib when it is called, so that no command waits for what it does not
 need.
 
-A new command is a module here, an entry in ``_PANELS``, its examples in ``examples.py`` (without them the
-import fails), and a row in the README.
+A new command is a module here, an entry in ``_PANELS``, and a row in the README; a new option is an argument
+of its function.
 """
 
 from __future__ import annotations
@@ -15,86 +15,77 @@ import atexit
 import json
 import os
 import sys
-from collections.abc import Callable
 from io import TextIOWrapper
-from typing import Annotated
+from types import ModuleType
+from typing import Annotated, Any
 
 import typer
+from typer.core import TyperGroup
 
-from coop_drake.cli.bench import bench_command
-from coop_drake.cli.campaign import campaign_app
-from coop_drake.cli.compare import compare_command
-from coop_drake.cli.diagram import diagram_command
-from coop_drake.cli.doctor import doctor_command
-from coop_drake.cli.examples import epilog
-from coop_drake.cli.floor_plan import floor_plan_command
+from coop_drake.cli import (
+    apart,
+    campaign,
+    diagram,
+    doctor,
+    floor_plan,
+    new,
+    plan,
+    reproduce,
+    robot,
+    run,
+    show,
+    simulate,
+    tune,
+    verify,
+    watch,
+    why,
+)
 from coop_drake.cli.kernel_cache import keep_kernels_somewhere
-from coop_drake.cli.keys import keys_command
-from coop_drake.cli.maps import maps_command
-from coop_drake.cli.new import new_command
-from coop_drake.cli.object import object_command
-from coop_drake.cli.plan import plan_command
 from coop_drake.cli.reporter import ExitCode, Reporter
-from coop_drake.cli.reproduce import reproduce_command
-from coop_drake.cli.robot import robot_command
-from coop_drake.cli.robot_node import robot_node_command
-from coop_drake.cli.run import run_command
-from coop_drake.cli.schema import schema_command
-from coop_drake.cli.show import show_command
-from coop_drake.cli.simulate import simulate_command
-from coop_drake.cli.supervisor import supervisor_command
-from coop_drake.cli.tune import tune_command
-from coop_drake.cli.verify import verify_command
-from coop_drake.cli.warm import warm_command
-from coop_drake.cli.watch import watch_command
-from coop_drake.cli.why import why_command
-from coop_drake.cli.world import world_command
 
-_PANELS: dict[str, dict[str, Callable[..., None] | typer.Typer]] = {
-    "Carrying objects": {
-        "run": run_command,
-        "plan": plan_command,
-        "simulate": simulate_command,
-        "tune": tune_command,
-        "compare": compare_command,
-        "campaign": campaign_app,
-    },
-    "A case of your own": {
-        "new": new_command,
-        "floor-plan": floor_plan_command,
-        "robot": robot_command,
-        "object": object_command,
-        "show": show_command,
-        "schema": schema_command,
-    },
-    "Processes of their own": {
-        "world": world_command,
-        "robot-node": robot_node_command,
-        "supervisor": supervisor_command,
-        "keys": keys_command,
-    },
-    "Understanding answers": {
-        "why": why_command,
-        "verify": verify_command,
-        "watch": watch_command,
-        "diagram": diagram_command,
-        "reproduce": reproduce_command,
-    },
-    "This machine": {
-        "doctor": doctor_command,
-        "warm": warm_command,
-        "maps": maps_command,
-        "bench": bench_command,
-    },
+_PANELS: dict[str, tuple[ModuleType, ...]] = {
+    "Carrying objects": (run, plan, simulate, tune, campaign, apart),
+    "A case of your own": (new, floor_plan, robot, show),
+    "Understanding answers": (why, verify, watch, diagram, reproduce),
+    "This machine": (doctor,),
 }
-"""Every command by its name, under the headings of the help and in its order."""
+"""The modules of all commands, under the headings of the help and in its order."""
 
-_PASSES_ARGUMENTS_ON = {"bench": {"allow_extra_args": True, "ignore_unknown_options": True}}
-"""Settings of commands that hand their arguments to another program."""
+_OLD_NAMES: dict[tuple[str, str], str] = {
+    ("keys", ""): "`coop-drake apart keys`",
+    ("world", ""): "`coop-drake apart world`",
+    ("supervisor", ""): "`coop-drake apart supervisor`",
+    ("robot-node", ""): "`coop-drake apart robot`",
+    ("warm", ""): "`coop-drake doctor --warm`",
+    ("maps", "--clear"): "`coop-drake doctor --clear-maps`",
+    ("maps", ""): "`coop-drake doctor --maps`",
+    ("object", ""): "`coop-drake new object`",
+    ("schema", ""): "the file models/scenario.schema.json",
+    ("bench", ""): "`python -m benchmarks`, in a clone of the repository",
+    ("compare", ""): "`coop-drake run` with `plant: {grasps: constraints}` in the scenario",
+    ("plan", "--workers"): "nothing: a plan is made in one process",
+    ("run", "--workers"): "nothing: a plan is made in one process",
+    ("campaign", "question"): "`python -m benchmarks question`, in a clone of the repository",
+}
+"""Commands of before, each alone or with an option or a command below it, and what takes their place."""
 
-_UsageError = typer.BadParameter.__base__  # The same base in typer's own click and in the package click.
+_UsageError: Any = typer.BadParameter.__base__  # The same base in typer's own click and in the package click.
+
+
+class _Commands(TyperGroup):
+    """Refuses commands and options of before by their new names."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Look for old names among the arguments, options cut at their ``=``."""
+        words = [word.partition("=")[0] for word in args]
+        for (command, part), now in () if ctx.resilient_parsing else _OLD_NAMES.items():
+            if words[:1] == [command] and (not part or part in words[1:]):
+                raise _UsageError(f"`{' '.join(filter(None, (command, part)))}` is now {now}.", ctx)
+        return super().parse_args(ctx, args)
+
 
 app = typer.Typer(
+    cls=_Commands,
     name="coop-drake",
     help="Plan, map, control and simulate several mobile manipulators that carry one object.",
     epilog="Begin with `coop-drake run base`, and for a case of your own with `coop-drake new NAME`.\n\n"
@@ -117,7 +108,7 @@ def main() -> None:
         code = app(arguments, standalone_mode=False)
         if code == ExitCode.INTERRUPTED and not Reporter.complained:  # before or after the command itself
             raise KeyboardInterrupt
-    except _UsageError as error:  # type: ignore[misc]
+    except _UsageError as error:
         error.show()
         if "--json" in arguments:
             sys.stdout.write(json.dumps({"error": error.format_message()}) + "\n")
@@ -141,10 +132,17 @@ def show_version(
         raise typer.Exit
 
 
-for panel, commands in _PANELS.items():
-    for name, command in commands.items():
-        if isinstance(command, typer.Typer):
-            app.add_typer(command, name=name, epilog=epilog(name), rich_help_panel=panel)
-            continue
-        settings = _PASSES_ARGUMENTS_ON.get(name)
-        app.command(name, epilog=epilog(name), rich_help_panel=panel, context_settings=settings)(command)
+def _epilog(module: ModuleType) -> str:
+    """Return the examples of a command as text for the end of its help; blank lines keep them apart."""
+    lines = [f"coop-drake {line}  [dim]{what}[/]" for line, what in module.EXAMPLES]
+    return "\n\n".join(["[bold]Examples[/]", *lines])
+
+
+for _panel, _modules in _PANELS.items():
+    for _module in _modules:
+        _word = _module.__name__.rpartition(".")[2]
+        _said: dict[str, Any] = {"name": _word.replace("_", "-"), "epilog": _epilog(_module)}
+        if _group := getattr(_module, f"{_word}_app", None):
+            app.add_typer(_group, **_said, rich_help_panel=_panel)
+        else:
+            app.command(**_said, rich_help_panel=_panel)(getattr(_module, f"{_word}_command"))

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import shlex
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.markup import escape
-from typer.core import TyperGroup
 
 from coop_drake.cli.campaign_state import show_state
-from coop_drake.cli.options import Machine, NoFigures, Quiet, out_folder
+from coop_drake.cli.options import FirstByDefault, Machine, NoFigures, Quiet, out_folder
 from coop_drake.cli.reporter import ExitCode, reporting
 
 if TYPE_CHECKING:
@@ -19,19 +18,16 @@ if TYPE_CHECKING:
     from coop_drake.campaign.batches import Batch
     from coop_drake.campaign.results import CampaignFolder
 
-
-class _RunByDefault(TyperGroup):
-    """Takes ``campaign FILE`` for ``campaign run FILE``."""
-
-    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        """Put the command ``run`` before arguments that begin with no command."""
-        if args and args[0] not in self.commands and args[0] != "--help":
-            args = ["run", *args]
-        return super().parse_args(ctx, args)
+EXAMPLES = (
+    ("campaign many.campaign.yaml", "make all runs, or those that are missing, into out/campaigns/many/"),
+    ("campaign status many.campaign.yaml", "how far it is, what was lost, the least margins"),
+    ("campaign report many.campaign.yaml", "a page with rates, distributions and the worst runs"),
+    ("campaign replay many.campaign.yaml 17", "one of its runs again, with recording and figures"),
+)
 
 
 campaign_app = typer.Typer(
-    cls=_RunByDefault,
+    cls=FirstByDefault,
     no_args_is_help=True,
     rich_markup_mode="rich",
     help="Make thousands of runs by seed on this machine or on many, and report margins and losses.",

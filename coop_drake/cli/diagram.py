@@ -8,12 +8,15 @@ from typing import Annotated
 import typer
 from rich.markup import escape
 
-from coop_drake.cli.maps import map_cells
 from coop_drake.cli.options import PictureFolder, Quiet, ScenarioPath
 from coop_drake.cli.plan import plan_of
 from coop_drake.cli.reporter import ExitCode, Reporter, reporting
 from coop_drake.cli.results import ResultFolder
-from coop_drake.cli.task import read_task
+from coop_drake.cli.task import map_cells, read_task
+
+EXAMPLES = (
+    ("diagram models/base.scenario.yaml --robot 1", "the blocks of the loop and of the second robot"),
+)
 
 
 def diagram_command(

@@ -14,14 +14,22 @@ from typing import Annotated
 import typer
 from rich.markup import escape
 
-from coop_drake.cli.maps import map_cache
 from coop_drake.cli.options import Machine
-from coop_drake.cli.reporter import ExitCode, reporting
+from coop_drake.cli.reporter import ExitCode, Reporter, reporting
+from coop_drake.cli.task import map_cache
+from coop_drake.cli.warm import compile_kernels
 
 _LEAST_MEMORY = 1.0
 """Memory that a run needs, with a reserve: it peaks at about 0.6 [GB]."""
 
 _MARKS = {True: "[green]ok[/]", False: "[red]wrong[/]", None: "[yellow]note[/]"}
+
+EXAMPLES = (
+    ("doctor", "a table of what works"),
+    ("doctor --json", "the same for machines"),
+    ("doctor --warm", "compile all kernels ahead"),
+    ("doctor --maps", "where solved maps are kept; `--clear-maps` forgets them"),
+)
 
 
 @dataclass(frozen=True)
@@ -42,22 +50,54 @@ class Finding:
 
 
 def doctor_command(
+    warm: Annotated[
+        bool,
+        typer.Option("--warm", help="Compile all kernels ahead, so that the next command starts at once."),
+    ] = False,
+    maps: Annotated[
+        bool, typer.Option("--maps", help="Show where solved maps are kept for later runs.")
+    ] = False,
+    clear_maps: Annotated[bool, typer.Option("--clear-maps", help="Delete all solved maps.")] = False,
     machine: Machine = False,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Show only what is wrong.")] = False,
 ) -> None:
-    """Check the installation: versions, Drake, Meshcat, fonts, compiled parts, memory, caches."""
+    """Check the installation: versions, Drake, Meshcat, fonts, compiled parts, memory, caches.
+
+    With an option it does what that says instead.
+    """
     with reporting(machine=machine, quiet=quiet) as reporter:
-        findings = examine()
-        wrong = [finding for finding in findings if finding.fine is False]
-        reporter.facts.update(healthy=not wrong, findings=[asdict(finding) for finding in findings])
-        rows = [(finding.what, f"{escape(finding.state)}  {_MARKS[finding.fine]}") for finding in findings]
-        reporter.table("coop-drake doctor", rows)
-        for finding in findings:
-            if finding.fine is None:
-                reporter.say(f"{finding.what}: {escape(finding.remedy)}")
-        if wrong:
-            reporter.complain("; ".join(f"{one.what}: {one.state}: {one.remedy}" for one in wrong))
-            reporter.code = ExitCode.FAILED_RUN
+        if warm:
+            compile_kernels(reporter)
+        if maps or clear_maps:
+            _show_maps(reporter, clear=clear_maps)
+        if not (warm or maps or clear_maps):
+            _diagnose(reporter)
+
+
+def _diagnose(reporter: Reporter) -> None:
+    """Show the results of all checks; a failed one makes the command fail."""
+    findings = examine()
+    wrong = [finding for finding in findings if finding.fine is False]
+    reporter.facts.update(healthy=not wrong, findings=[asdict(finding) for finding in findings])
+    rows = [(finding.what, f"{escape(finding.state)}  {_MARKS[finding.fine]}") for finding in findings]
+    reporter.table("coop-drake doctor", rows)
+    for finding in findings:
+        if finding.fine is None:
+            reporter.say(f"{finding.what}: {escape(finding.remedy)}")
+    if wrong:
+        reporter.complain("; ".join(f"{one.what}: {one.state}: {one.remedy}" for one in wrong))
+        reporter.code = ExitCode.FAILED_RUN
+
+
+def _show_maps(reporter: Reporter, *, clear: bool) -> None:
+    """Say where solved maps are kept for later runs, and delete them if asked."""
+    store = map_cache()
+    count, size = len(store.files()), store.size() / 1e6
+    if clear:
+        store.clear()
+    reporter.facts.update(folder=str(store.folder), maps=count, size_mb=round(size, 3), cleared=clear)
+    verb = "Deleted" if clear else "There are"
+    reporter.say(f"{verb} {count} maps of {size:.1f} MB in {escape(str(store.folder))}")
 
 
 def examine() -> list[Finding]:
@@ -127,7 +167,7 @@ def _kernels() -> Finding:
 
     home = Path(__file__).parents[1]
     compiled = sum(1 for _ in (Path(config.CACHE_DIR) if config.CACHE_DIR else home).rglob("*.nbc"))
-    remedy = "`coop-drake warm` with any scenario compiles them ahead; else the first run does, for a minute"
+    remedy = "`coop-drake doctor --warm` compiles them ahead; else the first run does, for a minute"
     return Finding("compiled kernels", f"{compiled} in the cache", True if compiled else None, remedy)
 
 

@@ -18,6 +18,14 @@ if TYPE_CHECKING:
 _PICTURES = (".png", ".svg")
 _SECTIONS = (".yaml", ".yml")
 
+EXAMPLES = (
+    ("floor-plan hall.dxf --unit mm --out hall.png", "look at a drawing"),
+    (
+        "floor-plan map.yaml --inside 2 3 --tolerance 0.05 --out workspace.yaml",
+        "an occupancy map as a scenario's workspace; a scenario may name the file itself, too",
+    ),
+)
+
 
 def floor_plan_command(
     file: Annotated[

@@ -8,11 +8,10 @@ from pathlib import Path
 
 from rich.markup import escape
 
-from coop_drake.cli.maps import map_cells
 from coop_drake.cli.plan import plan_of
 from coop_drake.cli.reporter import ExitCode, Reporter
 from coop_drake.cli.results import ResultFolder
-from coop_drake.cli.task import Task, read_task
+from coop_drake.cli.task import Task, map_cells, read_task
 from coop_drake.tuning import (
     CRITERIA,
     TUNED,

@@ -1,4 +1,4 @@
-"""The command new: a scenario with its models, from a few flags or questions."""
+"""The command new: a scenario with its models, from a few flags or questions; and the model of an object."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from rich.markup import escape
 
-from coop_drake.cli.options import Machine, Quiet, out_folder
+from coop_drake.cli.options import FirstByDefault, Machine, Quiet, out_folder
 from coop_drake.cli.reporter import ExitCode, Reporter, reporting
 
 if TYPE_CHECKING:
@@ -26,8 +26,28 @@ _QUESTIONS: tuple[tuple[str, str, Any], ...] = (
     ("width", "Width of the object [m]", 0.5),
 )
 
+EXAMPLES = (
+    ("new mine --robots 3 --arm 0.3,0.3,0.3 --door 1.6", "a team and two rooms into mine/"),
+    ("new hall --floor-plan hall.svg --unit cm --start 1 2 0 --goal 7 2 1.57", "on a floor of your own"),
+    (
+        "new object ell --corners '-0.4 -0.25, 0.4 -0.25, 0.4 0, -0.1 0, -0.1 0.25, -0.4 0.25' "
+        "--mass 2 --grasps '0.4 -0.125 0, -0.4 0 3.1415926536'",
+        "an L with two grasps, into ell.sdf and a mesh for each convex part",
+    ),
+)
 
-def new_command(
+
+new_app = typer.Typer(
+    cls=FirstByDefault,
+    no_args_is_help=True,
+    rich_markup_mode="rich",
+    help="Write a scenario with its models, or the model of a polygonal object, to start from.",
+)
+"""The command with those below it."""
+
+
+@new_app.command("scenario")
+def scenario_command(
     name: Annotated[str, typer.Argument(metavar="NAME", help="Name of scenario and folder.")],
     robots: Annotated[
         int | None, typer.Option("--robots", metavar="N", help="Number of robots, 2 to 6; default 2.")
@@ -91,7 +111,10 @@ def new_command(
     machine: Machine = False,
     quiet: Quiet = False,
 ) -> None:
-    """Write a scenario and its models to start from; asks at a terminal for what no flag says."""
+    """Write a scenario and its models to start from; asks at a terminal for what no flag says.
+
+    `new NAME` means the same.
+    """
     flags: dict[str, Any] = {
         "robots": robots,
         "arm": arm,
@@ -104,8 +127,7 @@ def new_command(
     said: dict[str, Any] = {key: value for key, value in flags.items() if value is not None}
     if "arm" in said:
         said["links"] = _lengths(str(said.pop("arm")))
-    if not name.replace("-", "_").isidentifier():
-        raise typer.BadParameter(f"{name} is no name of letters, digits, - and _.")
+    _check_name(name)
     for flag, given in (("--unit", unit), ("--scale", scale), ("--layer", layer)):
         if given and floor_plan is None:
             raise typer.BadParameter(f"{flag} is for a floor plan; name it with --floor-plan.")
@@ -201,3 +223,76 @@ def _write(starter: Starter, folder: Path, reporter: Reporter, *, force: bool) -
     reporter.say(f"Written: {', '.join(escape(str(folder / name)) for name in files)}")
     reporter.say(f"Next: coop-drake run {escape(str(file))}")
     return ExitCode.DONE
+
+
+@new_app.command("object")
+def object_command(
+    name: Annotated[str, typer.Argument(metavar="NAME", help="Name of the model and of its files.")],
+    corners: Annotated[
+        str,
+        typer.Option("--corners", metavar="XY", help="The outline in metres, as one text: 'X Y, X Y, X Y'."),
+    ],
+    mass: Annotated[float, typer.Option("--mass", metavar="KG", help="Mass in kg.")],
+    grasps: Annotated[
+        str,
+        typer.Option(
+            "--grasps",
+            metavar="FRAMES",
+            help="Grasp frames, 'X Y FACING, X Y FACING' in metres and radians; x points outwards.",
+        ),
+    ] = "",
+    height: Annotated[float, typer.Option("--height", metavar="M", help="Height in metres.")] = 0.2,
+    elevation: Annotated[
+        float,
+        typer.Option("--elevation", metavar="M", help="Height of its middle over the floor: the grippers'."),
+    ] = 0.4,
+    inertia: Annotated[
+        float | None,
+        typer.Option(
+            "--inertia",
+            metavar="KG_M2",
+            help="About the vertical through the centre of mass; that of uniform density by default.",
+        ),
+    ] = None,
+    out: Annotated[Path, out_folder("The folder; this one by default.")] = Path(),
+    force: Annotated[bool, typer.Option("--force", help="Replace files that are there already.")] = False,
+    machine: Machine = False,
+    quiet: Quiet = False,
+) -> None:
+    """Write the model of a polygonal object: an SDF file, and a mesh for each convex part."""
+    outline, frames = _rows(corners, 2, "--corners"), _rows(grasps, 3, "--grasps")
+    _check_name(name)
+    with reporting(machine=machine, quiet=quiet) as reporter:
+        from coop_drake.errors import ScenarioError
+        from coop_drake.plant.polygon_body import polygon_body_files, write_polygon_body
+
+        files = polygon_body_files(
+            outline, mass, name, height, inertia=inertia, elevation=elevation, grasps=frames
+        )
+        for file in files:
+            if (out / file).exists() and not force:
+                raise ScenarioError(str(out / file), "--out", str(out), "a folder without it, or --force")
+        path = write_polygon_body(files, out)
+        reporter.facts.update(model=str(path), files=sorted(str(out / file) for file in files))
+        reporter.say(f"The model is {escape(str(path))}; a scenario uses it with these lines:\n")
+        reporter.say(f"- add_model: {{name: object, file: {escape(path.as_posix())}}}")
+        for k in range(len(frames)):
+            reporter.say(f"- add_weld: {{parent: object::grasp_{k}, child: robot_{k}::gripper}}")
+
+
+def _check_name(name: str) -> None:
+    if not name.replace("-", "_").isidentifier():
+        raise typer.BadParameter(f"{name} is no name of letters, digits, - and _.")
+
+
+def _rows(text: str, count: int, option: str) -> list[list[float]]:
+    """Parse rows of numbers: commas between rows, spaces between numbers."""
+    try:
+        rows = [[float(number) for number in row.split()] for row in text.split(",") if row.strip()]
+    except ValueError as error:
+        raise typer.BadParameter(f"{option}: {error}.") from None
+    for row in rows:
+        if len(row) != count:
+            needed = f"{count} numbers; write commas between rows, spaces inside"
+            raise typer.BadParameter(f"{option}: {row} should be {needed}.")
+    return rows

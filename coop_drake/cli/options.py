@@ -6,11 +6,22 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import typer
+from typer.core import TyperGroup
 
 from coop_drake.shipped import scenario_file, shipped_scenarios
 
 _ENDING = ".scenario.yaml"
 _SHIPPED_GAINS = ("scheduled", "table_2")
+
+
+class FirstByDefault(TyperGroup):
+    """Takes its first command where none is named: ``campaign FILE`` for ``campaign run FILE``."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Put the first command before arguments that begin with no command."""
+        if args and args[0] not in self.commands and args[0] != "--help":
+            args = [next(iter(self.commands)), *args]
+        return super().parse_args(ctx, args)
 
 
 def out_folder(meaning: str) -> Any:
@@ -97,15 +108,6 @@ Effort = Annotated[
         "twice as much; the scenario's `planner: {effort}` by default.",
     ),
 ]
-Workers = Annotated[
-    int | None,
-    typer.Option(
-        "--workers",
-        metavar="N",
-        min=1,
-        help="Processes that plan at a time; one a core by default. The answer is the same.",
-    ),
-]
 ResultsFolder = Annotated[Path | None, out_folder("Where results go; out/<scenario> by default.")]
 PictureFolder = Annotated[Path | None, out_folder("Where the picture goes; out/<scenario> by default.")]
 Machine = Annotated[
@@ -116,7 +118,10 @@ Verbose = Annotated[
 ]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Show errors only.")]
 FreshMaps = Annotated[
-    bool, typer.Option("--fresh-maps", help="Solve all maps anew; others come from the cache, see `maps`.")
+    bool,
+    typer.Option(
+        "--fresh-maps", help="Solve all maps anew; others come from the cache, see `doctor --maps`."
+    ),
 ]
 Live = Annotated[
     bool,

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -17,7 +16,6 @@ from coop_drake.cli.options import (
     ResultsFolder,
     ScenarioPath,
     Verbose,
-    Workers,
 )
 from coop_drake.cli.planning_process import beside, prepare_simulation
 from coop_drake.cli.reporter import ExitCode, Reporter, reporting
@@ -28,6 +26,12 @@ from coop_drake.cli.task import Task, read_task
 if TYPE_CHECKING:
     from coop_drake.answers import Plan, PlanningResult
 
+EXAMPLES = (
+    ("plan models/base.scenario.yaml", "write out/base/plan.json and table_1.md"),
+    ("plan models/base.scenario.yaml --effort 8", "eight times the work, for a quicker transport"),
+    ("plan models/closed.scenario.yaml", "exit code 3 and a proof that there is no plan"),
+)
+
 
 def plan_command(
     scenario: ScenarioPath,
@@ -35,7 +39,6 @@ def plan_command(
     gains: GainsName = None,
     budget: BudgetName = None,
     effort: Effort = None,
-    workers: Workers = None,
     machine: Machine = False,
     quiet: Quiet = False,
     verbose: Verbose = False,
@@ -44,7 +47,7 @@ def plan_command(
     with reporting(machine=machine, quiet=quiet, verbose=verbose) as reporter:
         task = read_task(scenario, gains, reporter)
         folder = ResultFolder.of(task.name, out, "plan")
-        if plan_of(task, folder, reporter, budget, effort=effort, workers=workers):
+        if plan_of(task, folder, reporter, budget, effort=effort):
             reporter.table(task.name, summary_rows(reporter.facts, verbose=reporter.verbose))
             reporter.say(f"The plan is in {escape(str(folder.plan))}")
 
@@ -56,17 +59,16 @@ def plan_of(
     budget: str | None = None,
     *,
     effort: float | None = None,
-    workers: int | None = None,
     simulated: bool = False,
 ) -> Plan | None:
     """Plan, and note the facts; without a plan say so, and set the exit code.
 
     It holds under the ``budget`` that the option of this name says, or else the scenario's ``deployment``;
-    ``effort`` takes the place of the scenario's, ``workers`` that of the number of processors.
+    ``effort`` takes the place of the scenario's.
     The plan with its table of cells, a way that limits refuse, or the proof that there is none, goes to the
     folder if one is given. If the plan will be ``simulated``, this is prepared at the same time.
     """
-    result = answer_to(task, reporter, budget, effort=effort, workers=workers, simulated=simulated)
+    result = answer_to(task, reporter, budget, effort=effort, simulated=simulated)
     return report_answer(task, result, folder, reporter)
 
 
@@ -76,7 +78,6 @@ def answer_to(
     budget: str | None = None,
     *,
     effort: float | None = None,
-    workers: int | None = None,
     simulated: bool = False,
 ) -> PlanningResult:
     """Ask the planner, and note the facts; see ``plan_of``."""
@@ -101,7 +102,6 @@ def answer_to(
             gain_set_name=name,
             budget=tolerated,
             effort=effort,
-            workers=workers or os.cpu_count() or 1,
         )
         if simulated:
             prepare = partial(prepare_simulation, task.scenario)

@@ -1,24 +1,36 @@
-"""Planning in a process of its own, while this one imports what simulating needs and reads the models.
+"""Planning in a copy of this process, while this one imports what simulating needs and reads the models.
 
 In one process the two would take turns: Python's global lock is held while libraries are imported.
 """
 
 from __future__ import annotations
 
+import os
+import signal
+import sys
 from collections.abc import Callable
 from contextlib import suppress
+from multiprocessing import Pipe
+from multiprocessing.connection import Connection
 from threading import Thread
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, NoReturn, TypeVar
 
 from coop_drake.cli.kernel_clock import kernel_clock
+from coop_drake.errors import ProcessError, transferable
+from coop_drake.interrupts import uninterrupted
 from coop_drake.kernel_times import KERNEL_TIMES
-from coop_drake.planning.copies import FORKS, Copy, Send
 from coop_drake.progress import Progress
 
 if TYPE_CHECKING:
     from coop_drake.scenario import Scenario
 
 R = TypeVar("R")
+
+Send = Callable[..., None]
+"""Sends a message to the process that was copied: its kind, and what belongs to it."""
+
+FORKS = sys.platform == "linux"
+"""Whether a copy of this process can work: libraries of macOS may not be used in one."""
 
 
 def beside(work: Callable[[Progress], R], meanwhile: Callable[[], object], progress: Progress) -> R:
@@ -91,3 +103,69 @@ def _followed(copy: Copy, progress: Progress) -> Any:
             KERNEL_TIMES.wall_seconds += wall_seconds
             KERNEL_TIMES.cpu_seconds += cpu_seconds
             return result
+
+
+class Copy:
+    """A copy of this process that does some work and ends; it also ends when this process does.
+
+    Its last message is of the kind ``result`` with what the work returned, or ``error`` with what it raised.
+
+    Args:
+        work: Called in the copy with what sends further messages. It shall show nothing; what it changes in
+            the copy is lost.
+
+    Attributes:
+        connection: Where messages come in.
+        pid: Number of the process.
+    """
+
+    def __init__(self, work: Callable[[Send], object]) -> None:
+        self.connection, theirs = Pipe()
+        with uninterrupted():
+            self.pid = os.fork()
+            if self.pid == 0:  # Ctrl-C stays blocked here: the process that was copied is told.
+                self.connection.close()
+                _work(work, theirs)
+        theirs.close()
+
+    def receive(self) -> tuple[Any, ...]:
+        """Wait for the next message, and return its kind and what belongs to it.
+
+        Raises:
+            ProcessError: The copy was ended.
+        """
+        try:
+            message: tuple[Any, ...] = self.connection.recv()
+        except (EOFError, ConnectionError):
+            raise ProcessError("the process that plans was ended") from None
+        return message
+
+    def end(self) -> None:
+        """End the copy, if it has not ended."""
+        self.connection.close()
+        with suppress(ProcessLookupError):
+            os.kill(self.pid, signal.SIGKILL)
+        os.waitpid(self.pid, 0)
+
+
+def _work(work: Callable[[Send], object], connection: Connection) -> NoReturn:
+    """Do the work, send what comes of it, and end; end before if the other process does."""
+
+    def watch() -> None:
+        with suppress(EOFError, OSError):
+            connection.recv()
+        os._exit(1)
+
+    def send(*message: object) -> None:
+        connection.send(message)
+
+    KERNEL_TIMES.compiling = None  # Another thread may have held a lock that showing needs.
+    Thread(target=watch, daemon=True).start()
+    try:
+        try:
+            send("result", work(send))
+        except Exception as error:
+            with suppress(ConnectionError):
+                send("error", transferable(error))
+    finally:  # Never goes back into what the other process does.
+        os._exit(0)

@@ -8,9 +8,12 @@ from typing import Annotated
 import typer
 from rich.markup import escape
 
-from coop_drake.cli.clone import root_of_clone
+import coop_drake
 from coop_drake.cli.options import Machine, Quiet, out_folder
 from coop_drake.cli.reporter import ExitCode, Reporter, reporting
+from coop_drake.errors import CoopDrakeError
+
+EXAMPLES = (("reproduce", "the paper's tables and figures beside ours, into out/reproduction/index.html"),)
 
 
 def reproduce_command(
@@ -30,9 +33,9 @@ def reproduce_command(
 
 
 def _reproduce(scenario: Path | None, out: Path, reporter: Reporter) -> ExitCode:
-    root_of_clone("paper")
+    _check_clone()
     # Here and not above: no other command should wait for Drake, and only a clone has the package `paper`.
-    from coop_drake.cli.maps import map_cache
+    from coop_drake.cli.task import map_cache
     from coop_drake.scenario import load_scenario
     from paper import Agreement, gather, write_report
 
@@ -56,3 +59,13 @@ def _reproduce(scenario: Path | None, out: Path, reporter: Reporter) -> ExitCode
     for violation in filter(None, violations):
         reporter.complain(violation)
     return ExitCode.FAILED_RUN if any(violations) else ExitCode.DONE
+
+
+def _check_clone() -> None:
+    """Refuse where the package ``paper`` is not there, as in an installed coop_drake."""
+    root = Path(coop_drake.__file__).resolve().parent.parent
+    if not (root / "paper" / "__init__.py").is_file():
+        raise CoopDrakeError(
+            f"{root}: paper: not found: an installed package comes without it; expected a clone of the "
+            "repository, whose folder paper holds what this command runs"
+        )

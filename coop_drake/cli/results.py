@@ -30,7 +30,6 @@ _FILES = {
         "fig13_torque.png",
         "summary.png",
     ),
-    "comparison": ("compare.json",),
     "tuning": ("gains.yaml", "trials.json", "tuning.png"),
     "diagnosis": ("why.png", "why.svg"),
     "diagram": ("diagram.svg",),

@@ -14,6 +14,17 @@ from coop_drake.cli.reporter import ExitCode, Reporter, reporting
 if TYPE_CHECKING:
     from coop_drake.plant.joint_survey import SurveyedJoint
 
+EXAMPLES = (
+    (
+        "robot stretch4.urdf --gripper link_grasp_center --out models/stretch4",
+        "model and meshes in one folder with a gripper frame, joints judged, lines for a scenario",
+    ),
+    (
+        "robot pr2.urdf --package pr2_description=../pr2 --fix r_elbow_flex_joint=-0.3 --out models",
+        "with a package's folder, and the axes behind a joint that will be fixed",
+    ),
+)
+
 
 def robot_command(
     model: Annotated[Path, typer.Argument(metavar="MODEL", help="A *.urdf or *.sdf file; run xacro before.")],

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from functools import partial
 from math import inf
 from pathlib import Path
@@ -11,8 +13,6 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import typer
 from rich.markup import escape
 
-from coop_drake.cli.live import live_page
-from coop_drake.cli.maps import map_cells, write_accuracies
 from coop_drake.cli.options import (
     Apart,
     BlocksName,
@@ -31,7 +31,6 @@ from coop_drake.cli.options import (
     ScenarioPath,
     Verbose,
     Wait,
-    Workers,
 )
 from coop_drake.cli.plan import plan_of
 from coop_drake.cli.reporter import ExitCode, Reporter, reporting
@@ -43,7 +42,7 @@ from coop_drake.cli.summary import (
     simulation_facts,
     summary_rows,
 )
-from coop_drake.cli.task import Task, read_task
+from coop_drake.cli.task import Task, map_cells, read_task, write_accuracies
 from coop_drake.nodes.states import REJOIN, RESTARTS
 from coop_drake.viz.drawing_processes import DrawingProcesses
 
@@ -52,10 +51,24 @@ if TYPE_CHECKING:
     from coop_drake.answers.log import SimulationLog
     from coop_drake.diagram import Blocks
     from coop_drake.fields import HarmonicMap
+    from coop_drake.messages.faults import Faults
     from coop_drake.viz import LivePage
 
 Simulation: TypeAlias = "Callable[..., SimulationLog]"
 """Simulates a scenario, plan and maps, and is given ``progress`` and ``observer``."""
+
+_WAIT_FOR_VIEWER = 30.0
+"""How long a live run waits for somebody to open its address [s]; a person needs a few seconds."""
+
+EXAMPLES = (
+    ("run models/base.scenario.yaml", "plan, simulate and record into out/base/"),
+    (
+        "run models/base.scenario.yaml --gains table_2 --out out/paper",
+        "with the paper's gains, into another folder",
+    ),
+    ("run models/base.scenario.yaml --live", "watch it in a browser while it is simulated"),
+    ("run models/base.scenario.yaml --json --quiet", "one JSON object for machines"),
+)
 
 
 def run_command(
@@ -63,7 +76,6 @@ def run_command(
     out: ResultsFolder = None,
     gains: GainsName = None,
     effort: Effort = None,
-    workers: Workers = None,
     fresh_maps: FreshMaps = False,
     live: Live = False,
     wait: Wait = False,
@@ -93,7 +105,7 @@ def run_command(
         )
         folder = ResultFolder.of(task.name, out, "plan", "simulation")
         with DrawingProcesses(figures=not no_figures) as drawing:
-            plan = plan_of(task, folder, reporter, effort=effort, workers=workers, simulated=True)
+            plan = plan_of(task, folder, reporter, effort=effort, simulated=True)
             if plan:
                 with live_page(task, plan, reporter, live=live, wait=wait) as page:
                     reporter.code = carry_out(
@@ -125,7 +137,6 @@ def simulation_of(
         return partial(_in_one_process, blocks)
     if blocks == "fused":
         raise typer.BadParameter("--apart and --blocks fused do not go together: one block drives the team.")
-    from coop_drake.cli.node_options import faults_of
     from coop_drake.diagram import control_period
     from coop_drake.nodes import simulate_in_processes, wall_clock
 
@@ -228,3 +239,38 @@ def _simulate(
     if reporter.facts["outcome"] == "arrived" and beyond_budget(reporter.facts):
         reporter.facts["outcome"] = "arrived, beyond its budget"
     return log
+
+
+def faults_of(task: Task, path: Path | None) -> Faults:
+    """Read what goes wrong between the processes of a team, nothing without a file.
+
+    Raises:
+        ScenarioError: The file is wrong, or is about a robot that the team does not have.
+    """
+    from coop_drake.messages.faults import NO_FAULTS, load_faults
+    from coop_drake.nodes import robots_of
+
+    return NO_FAULTS if path is None else load_faults(path, robots_of(task.scenario))
+
+
+@contextmanager
+def live_page(
+    task: Task, plan: Plan, reporter: Reporter, *, live: bool, wait: bool
+) -> Iterator[LivePage | None]:
+    """Serve the page of a live view within a ``with`` block, from when a browser shows it; None if not asked.
+
+    On a terminal the run waits half a minute for a browser, with ``wait`` everywhere until there is one.
+    """
+    if not (live or wait):
+        yield None
+        return
+    from coop_drake.viz import LivePage
+    from coop_drake.viz.server import silent_meshcat
+
+    with LivePage(task.scenario, plan, silent_meshcat(), facts=lambda: reporter.facts) as page:
+        reporter.facts["live_url"] = page.url
+        reporter.say(f"[bold]Live view: open {page.url} in a browser[/]")
+        if wait or sys.stdout.isatty():
+            with reporter.stage("waiting for a browser"):
+                page.wait_for_viewer(inf if wait else _WAIT_FOR_VIEWER)
+        yield page

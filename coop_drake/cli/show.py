@@ -17,6 +17,11 @@ from coop_drake.cli.task import read_task
 
 _PICTURES = (".png", ".svg")
 
+EXAMPLES = (
+    ("show models/base.scenario.yaml", "a picture of floor, start and goal"),
+    ("show models/base.scenario.yaml --plan out/base/plan.json --out base.svg", "with the plan's channel"),
+)
+
 
 def show_command(
     scenario: ScenarioPath,

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.markup import escape
 
-from coop_drake.cli.live import live_page
 from coop_drake.cli.options import (
     Apart,
     BlocksName,
@@ -28,7 +27,7 @@ from coop_drake.cli.options import (
 )
 from coop_drake.cli.reporter import Reporter, reporting
 from coop_drake.cli.results import ResultFolder
-from coop_drake.cli.run import carry_out, simulation_of
+from coop_drake.cli.run import carry_out, live_page, simulation_of
 from coop_drake.cli.summary import plan_facts
 from coop_drake.cli.task import Task, read_task
 from coop_drake.errors import RefusalError
@@ -37,6 +36,11 @@ from coop_drake.viz.drawing_processes import DrawingProcesses
 
 if TYPE_CHECKING:
     from coop_drake.answers import Plan
+
+EXAMPLES = (
+    ("simulate models/base.scenario.yaml", "carry out out/base/plan.json"),
+    ("simulate models/base.scenario.yaml --plan my_plan.json --gains table_2", "another plan, other gains"),
+)
 
 
 def simulate_command(

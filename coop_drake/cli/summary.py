@@ -56,7 +56,6 @@ _MORE_ROWS = (
     ("largest wrench error", "{max_wrench_error_n:.1e} N"),
     ("largest grasp error", "{max_grasp_error_m:.1e} m"),
     ("messages in the team", "{messages}"),
-    ("their payload", "{message_bytes} bytes"),
     ("peak rate of base forces", "{peak_base_force_rate_n_s:.0f} N/s"),
     ("peak joint torque", "{peak_joint_torque_nm:.1f} N m"),
     ("near stops between start and goal", "{near_stops}"),
@@ -210,7 +209,6 @@ def simulation_facts(plan: Plan, log: SimulationLog, problem: PlanningProblem) -
     from coop_drake.simulation import communication
 
     x, y, theta = log.object_pose[-1] - plan.goal_pose
-    messages = communication(log)
     near_stops, slow_seconds = steadiness(log)
     base_forces = np.hypot(log.base_wrenches[..., 0], log.base_wrenches[..., 1])
     return {
@@ -233,8 +231,7 @@ def simulation_facts(plan: Plan, log: SimulationLog, problem: PlanningProblem) -
         "max_wrench_error_n": float(log.wrench_error.max()),
         "max_grasp_error_m": float(log.grasp_error.max()),
         "max_governor_spread_m": float(log.governor_spread.max()),
-        "messages": messages.messages,
-        "message_bytes": messages.message_bytes,
+        "messages": communication(log).messages,
         "peak_base_wrench_n": float(base_forces.max()),
         "peak_base_force_rate_n_s": log.peak_force_rate,
         "peak_base_torque_nm": float(np.abs(log.base_wrenches[..., 2]).max()),

@@ -10,6 +10,15 @@ import typer
 from coop_drake.cli.options import GainsName, Machine, Quiet, ScenarioPath, out_folder
 from coop_drake.cli.reporter import reporting
 
+EXAMPLES = (
+    ("tune models/base.scenario.yaml", "less force in no more time, into out/base/tuned/gains.yaml"),
+    (
+        'tune models/base.scenario.yaml --criterion time --limit "peak_force<=1x"',
+        "less time with no more force",
+    ),
+    ("run models/base.scenario.yaml --gains out/base/tuned/gains.yaml", "use them"),
+)
+
 
 def tune_command(
     scenario: ScenarioPath,

@@ -17,6 +17,12 @@ from coop_drake.errors import RefusalError
 if TYPE_CHECKING:
     from coop_drake.verification import Check
 
+EXAMPLES = (
+    ("verify out/base/plan.json models/base.scenario.yaml", "check a plan"),
+    ("verify out/closed/certificate.json models/closed.scenario.yaml", "check a proof"),
+    ("verify out/base/log.npz models/base.scenario.yaml", "check a run by its log"),
+)
+
 
 def verify_command(
     certificate: Annotated[

@@ -1,4 +1,4 @@
-"""The command warm: compiles every kernel ahead, the planner's and the maps' side by side."""
+"""What `doctor --warm` does: compiles every kernel ahead, the planner's and the maps' side by side."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
+from pathlib import Path
 
-from coop_drake.cli.options import Quiet, ScenarioPath
-from coop_drake.cli.reporter import reporting
+from coop_drake.cli.reporter import Reporter
 from coop_drake.cli.task import Task, read_task
 from coop_drake.progress import Progress
 
@@ -21,12 +21,11 @@ _SIMULATED_SECONDS = 0.05
 """Simulated time after which every kernel of the closed loop has been called [s]."""
 
 
-def warm_command(scenario: ScenarioPath, quiet: Quiet = False) -> None:
+def compile_kernels(reporter: Reporter) -> None:
     """Compile all kernels, so that the next command starts at once; `make` does it when it sets up."""
-    with reporting(quiet=quiet) as reporter:
-        task = read_task(scenario, reporter=reporter)
-        with reporter.stage("compiling") as progress:
-            _compile(task, progress)
+    task = read_task(Path("base"), reporter=reporter)
+    with reporter.stage("compiling") as progress:
+        _compile(task, progress)
 
 
 def _compile(task: Task, progress: Progress) -> None:

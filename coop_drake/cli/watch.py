@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 _FEWEST, _MOST = 2, 500
 """Numbers of keyframes that make a moving picture and still fit into a page that browsers open [-]."""
 
+EXAMPLES = (("watch models/base.scenario.yaml", "pictures and a page of the search in out/base/think/"),)
+
 
 def _checked_margin(value: float | None) -> float | None:
     if value is not None and not isfinite(value):

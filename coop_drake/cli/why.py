@@ -17,6 +17,8 @@ from coop_drake.cli.task import Task, read_task
 if TYPE_CHECKING:
     from coop_drake.diagnosis import Diagnosis
 
+EXAMPLES = (("why models/closed.scenario.yaml", "what blocks, and what would help"),)
+
 
 def why_command(
     scenario: ScenarioPath,

@@ -91,7 +91,9 @@ class AddressBook:
         keys = dict(self._keys())
         for name, key in keys.items():
             if key is not None and not PUBLIC_KEY.fullmatch(key):
-                raise DataError(name, key, "a public key of 40 characters, as coop-drake keys prints it")
+                raise DataError(
+                    name, key, "a public key of 40 characters, as coop-drake apart keys prints it"
+                )
             if key is None and outside:
                 raise DataError(name, key, f"a public key: {outside[0]} is no address of this machine alone")
             if key is None and any(keys.values()):

@@ -71,7 +71,7 @@ def load_keys(path: Path) -> KeyPair:
         pair = KeyPair(public.decode(), (private or b"").decode())
         fits = PUBLIC_KEY.fullmatch(pair.private) and zmq.curve_public(pair.private.encode()) == public
     except (OSError, ValueError) as error:
-        raise ScenarioError(str(path), "the file", str(error), "a file of coop-drake keys") from error
+        raise ScenarioError(str(path), "the file", str(error), "a file of coop-drake apart keys") from error
     if not fits:
         raise ScenarioError(
             str(path), "secret-key", "this text", "the private key that belongs to the public one"

@@ -51,7 +51,6 @@ def plan(
     budget: Budget | None = None,
     effort: float | None = None,
     progress: Progress | None = None,
-    workers: int = 1,
 ) -> PlanningResult:
     """Find a plan, or prove that none exists.
 
@@ -70,9 +69,6 @@ def plan(
         effort: As ``PlannerSettings`` has it, in place of that of the problem.
         progress: Called with a phase and the fraction of it that is done. If it raises PatienceError, a plan
             is finished along the way that is certified by then; without one, the error goes to the caller.
-        workers: Processes at a time, copies of this one: they sample paths beside each other and beside a
-            proof, and try further paths. The answer is the same, byte for byte. Other threads of this process
-            must not hold locks that the planner needs, as copies do not have these threads.
 
     Raises:
         ValueError: The effort is negative or no number.
@@ -89,14 +85,12 @@ def plan(
     local, near = local_question(problem), None
     if local is not None:
         part, route = local
-        near = _answer(
-            part, gain_set, gain_set_name, budget, progress, partial(find_path, route=route), workers
-        )
+        near = _answer(part, gain_set, gain_set_name, budget, progress, partial(find_path, route=route))
         if isinstance(near, Found | BeyondLimits):
             near = replace(near, plan=replace(near.plan, problem=problem_digest(problem)))
         if isinstance(near, Found):
             return near
-    answer = _answer(problem, gain_set, gain_set_name, budget, progress, find_path, workers)
+    answer = _answer(problem, gain_set, gain_set_name, budget, progress, find_path)
     return near if isinstance(answer, Undecided) and isinstance(near, BeyondLimits) else answer
 
 
@@ -107,13 +101,12 @@ def _answer(
     budget: Budget | None,
     progress: Progress | None,
     search: Callable[..., tuple[CoveredPath | Channel | NoChannel, SearchReport]],
-    workers: int,
 ) -> PlanningResult:
     """Answer a question by a search, with smaller margins where its paths cannot be executed."""
     began = thread_time()
     question, report, stall, too_quick, way = problem, SearchReport(0), "", False, None
     for _ in range(1 + FINER_ATTEMPTS):
-        answer, latest = search(question, progress, workers=workers)
+        answer, latest = search(question, progress)
         report = _added(report, latest)
         if isinstance(answer, NoChannel):
             if answer.proved:
@@ -132,7 +125,7 @@ def _answer(
             question = replace(question, settings=replace(question.settings, margin=0.5 * answer.margin))
         else:
             latest = replace(report, improvements=())
-            found = _found(asked, answer, made, make, latest, began, progress, workers)
+            found = _found(asked, answer, made, make, latest, began, progress)
             return replace(found, plan=_stated(problem, found.plan)) if isinstance(found, Found) else found
     refused = way and _without_limits(problem, way, gain_set, gain_set_name, slowly=too_quick)
     return BeyondLimits(refused, report) if refused else Undecided(stall, report)
@@ -146,12 +139,11 @@ def _found(
     report: SearchReport,
     began: float,
     progress: Progress | None,
-    workers: int,
 ) -> Found | Undecided:
     """The quickest of a plan and of those along further paths; Undecided if all are beyond the budget."""
     plans = [made] if isinstance(made, Plan) else []
-    times, copies = [thread_time() - began], workers if workers > 1 else 0
-    for other in quicker_plans(way, made, make, problem.settings.effort, progress, copies):
+    times = [thread_time() - began]
+    for other in quicker_plans(way, made, make, problem.settings.effort, progress):
         plans.append(other)
         times.append(thread_time() - began)
     if not (isinstance(made, Plan) or plans):

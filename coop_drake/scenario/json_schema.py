@@ -2,6 +2,7 @@
 
 import dataclasses
 import inspect
+import json
 import math
 import re
 from types import UnionType
@@ -114,3 +115,7 @@ def _of_drake(kind: Any) -> Schema:
             properties[name] = {**properties[name]["anyOf"][0], "required": list(required)}
         schema.update(minProperties=1, maxProperties=1)
     return schema
+
+
+if __name__ == "__main__":
+    print(json.dumps(scenario_schema(), indent=1))

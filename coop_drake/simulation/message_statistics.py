@@ -2,19 +2,11 @@
 
 from __future__ import annotations
 
-import struct
 from dataclasses import dataclass
 
 import numpy as np
 
 from coop_drake.answers.log import SimulationLog
-
-REPORT = struct.Struct("<H?")
-"""Payload of a report [3 bytes]: the index of the cell that it is about, and whether its sender is ready to
-leave."""
-
-ANNOUNCEMENT = struct.Struct("<H")
-"""Payload of an announcement [2 bytes]: the index of the cell that is now the current one."""
 
 
 @dataclass(frozen=True)
@@ -24,12 +16,10 @@ class MessageStatistics:
     Attributes:
         reports: Reports of every robot to the cell planner, shape (N,).
         announcements: New cells, announced by the cell planner to each robot.
-        message_bytes: Payload of all of them [bytes].
     """
 
     reports: tuple[int, ...]
     announcements: int
-    message_bytes: int
 
     @property
     def messages(self) -> int:
@@ -50,5 +40,4 @@ def communication(log: SimulationLog) -> MessageStatistics:
     before[entered] = False
     reports = (ready != before).sum(axis=0)
     announcements = (int(entered.sum()) - 1) * len(reports)
-    size = int(reports.sum()) * REPORT.size + announcements * ANNOUNCEMENT.size
-    return MessageStatistics(tuple(int(count) for count in reports), announcements, size)
+    return MessageStatistics(tuple(int(count) for count in reports), announcements)

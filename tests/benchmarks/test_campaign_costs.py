@@ -7,6 +7,7 @@ from benchmarks.isolated import WorkerError
 from benchmarks.rows import Row
 
 
+@pytest.mark.slow
 def test_a_worker_has_a_size_after_every_batch():
     sizes = worker_memory(2, 1)
     assert len(sizes) == 2

@@ -81,6 +81,7 @@ def test_a_peer_is_judged_by_its_median_with_failures_counted():
     assert (values["fastest"], values["slowest"]) == (0.1, 0.2)
 
 
+@pytest.mark.slow
 def test_regions_of_drake_s_planner_hold_a_path_between_walls():
     run = run_gcs(EASY, 60.0)
     assert run.regions > 0

@@ -7,6 +7,7 @@ from tests.support.sampled_team import sampled
 from tests.support.small_loop import small_maps
 
 
+@pytest.mark.slow
 @pytest.mark.no_cover
 def test_a_kill_is_measured_from_the_fault_to_the_time_when_the_team_goes_on():
     scenario, plan = sampled("base")

@@ -41,6 +41,7 @@ def test_more_questions_and_other_floors_change_only_the_batches_that_they_conce
     assert others.isdisjoint(one.digest for one in few)
 
 
+@pytest.mark.slow
 def test_a_process_answers_as_this_one_does(campaign, tmp_path):
     folder = CampaignFolder(tmp_path)
     folder.campaign.write_text(FILE)

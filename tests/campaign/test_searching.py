@@ -21,6 +21,8 @@ from coop_drake.errors import ScenarioError
 from tests.support.cli import invoke
 from tests.support.scenarios import write_scenario
 
+pytestmark = pytest.mark.slow
+
 ASKED = {"set": {"deployment.preset": "mobile_base"}, "budget": "all", "scenarios": ["room.scenario.yaml"]}
 BROKEN = {**ASKED, "departures": ["angles", "model"], "runs": 2, "halvings": 6, "seed": 5}
 

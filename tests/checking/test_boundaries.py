@@ -189,6 +189,7 @@ BOUNDS = ((resource.RLIMIT_AS, 10**9), (resource.RLIMIT_CPU, 60))
 """A gigabyte, a minute of processor time."""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("make", LARGE.values(), ids=LARGE)
 def test_large_documents_are_decided_or_refused_within_a_minute_and_a_gigabyte(make, tmp_path):
     paths = [tmp_path / "question.json", tmp_path / "answer.json"]
@@ -206,6 +207,7 @@ def test_large_documents_are_decided_or_refused_within_a_minute_and_a_gigabyte(m
     assert done.stdout.startswith("refused: ")
 
 
+@pytest.mark.slow
 @pytest.mark.no_cover
 @pytest.mark.parametrize("way", [("floor", "outer"), ("pieces", 0, "corners")], ids=str)
 def test_a_million_corners_are_called_too_much_work(way):

@@ -94,6 +94,7 @@ def off(transport, z):
     return max(np.hypot(*(z[:2] - goal[:2])) / allowed.position, abs(z[2] - goal[2]) / allowed.angle)
 
 
+@pytest.mark.slow
 @pytest.mark.no_cover
 @pytest.mark.parametrize("transport", [ideal, budgeted], ids=["no budget", "budget"])
 @pytest.mark.parametrize("name", DEPARTURES)

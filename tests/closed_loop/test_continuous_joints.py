@@ -50,6 +50,7 @@ def sampled(tmp_path_factory):
     return scenario, answer.plan, build_maps(answer.plan)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("more", ["", BUDGET], ids=["ideal", "under a budget"])
 def test_a_turret_turns_through_pi_and_arrives(tmp_path, more):
     path = write_turret(tmp_path, 3.0, 3.3, more=more)

@@ -162,6 +162,7 @@ def test_a_mild_departure_is_survived(name):
     assert verified_run(*deployed(MILD[name]), log).answer == "arrived"
 
 
+@pytest.mark.slow
 def test_a_thousand_samples_a_second_are_survived_too():
     scenario, plan = small_problem("base")
     fast = replace(scenario, deployment=Deployment(control_rate=1000.0))

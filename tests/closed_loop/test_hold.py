@@ -79,6 +79,7 @@ def carried_on(scenario, loop, invariants, context, order, until):
     return samples
 
 
+@pytest.mark.slow
 @pytest.mark.no_cover
 def test_at_random_moments_the_team_rests_without_contact_in_time(base):
     scenario, loop, invariants, contexts = base
@@ -156,6 +157,7 @@ def test_a_robot_that_misses_the_order_holds_by_itself_and_the_team_arrives(seed
     assert verified_run(scenario, plan, log).answer == "arrived"
 
 
+@pytest.mark.slow
 def test_without_a_time_out_a_deaf_robot_goes_on_alone():
     deaf = RobotDepartures(deaf=Deafness(begin=0.2, duration=1.5))
     deployment = Deployment(control_rate=200.0, robots={"robot_0": deaf})

@@ -80,6 +80,7 @@ def test_what_goes_on_never_ends_in_an_arrival(departing):
     assert abs(fused.times[-1] - outcome.time) < 0.006
 
 
+@pytest.mark.slow
 def test_robots_in_nodes_of_their_own_let_the_drives_brake():
     log = simulated(BLOCKED, simulate_apart)
     assert not log.reached

@@ -78,6 +78,7 @@ def test_without_rate_terms_axes_come_nearer_to_their_bounds_than_stated():
         check_budget_used(Rows(log, plan))
 
 
+@pytest.mark.slow
 def test_the_plan_is_checked_with_the_bodies_of_its_team():
     scenario, plan, _ = planned()
     tree = planning_problem(scenario).tree

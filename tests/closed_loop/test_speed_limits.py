@@ -139,6 +139,7 @@ def test_a_run_that_was_faster_than_its_limits_is_refused(case):
         verify_log(log, plan, slower, run_setup(scenario))
 
 
+@pytest.mark.slow
 def test_sampled_and_noisy_teams_keep_their_limits():
     scenario = limited(
         "slow bases",

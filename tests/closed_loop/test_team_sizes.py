@@ -35,6 +35,7 @@ def run(request, tmp_path_factory, maps):
     return scenario, log
 
 
+@pytest.mark.slow
 def test_it_arrives_and_every_equation_holds_on_the_way(run):
     scenario, log = run
     assert log.violation == ""

@@ -26,6 +26,7 @@ runs:
 """
 
 
+@pytest.mark.slow
 def test_both_tiers_leave_the_same_record(tmp_path, monkeypatch):
     path, prepared = tmp_path / "both.campaign.yaml", []
     path.write_text(FILE)
@@ -48,6 +49,7 @@ def test_both_tiers_leave_the_same_record(tmp_path, monkeypatch):
     assert found["peak_force"] == pytest.approx(expected["peak_force"], rel=2e-3)
 
 
+@pytest.mark.slow
 def test_fused_blocks_leave_the_same_record_where_they_know_the_run(tmp_path):
     records = {}
     for blocks, hold in (("named", ""), ("fused", ""), ("fused", ", control.hold: {silence: 1.0}")):

@@ -12,6 +12,8 @@ from pathlib import Path
 
 import pytest
 
+pytestmark = pytest.mark.slow
+
 ROOT = Path(__file__).parents[2]
 EQUATIONS = (ROOT / "docs" / "equations.md").read_text(encoding="utf-8")
 LAWS = sorted(

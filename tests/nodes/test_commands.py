@@ -15,9 +15,9 @@ BASE = str(Path(__file__).parents[2] / "models" / "base.scenario.yaml")
     ("arguments", "said"),
     [
         (["run", BASE, "--apart"], "deployment.control_rate"),
-        (["world", BASE], "deployment.control_rate"),
-        (["robot-node", BASE, "0"], "deployment.control_rate"),
-        (["supervisor", BASE], "deployment.control_rate"),
+        (["apart", "world", BASE], "deployment.control_rate"),
+        (["apart", "robot", BASE, "0"], "deployment.control_rate"),
+        (["apart", "supervisor", BASE], "deployment.control_rate"),
         (["run", BASE, "--free-running"], "--free-running needs --apart"),
         (["run", BASE, "--faults", "faults.yaml"], "--faults needs --apart"),
         (["simulate", BASE, "--apart", "--blocks", "fused"], "do not go together"),

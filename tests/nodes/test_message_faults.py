@@ -56,6 +56,7 @@ def run(case):
 kept = cache(run)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", CASES)
 def test_a_team_goes_on_or_waits_at_rest_and_arrives_without_contact(case):
     log, facts = kept(case)

@@ -39,6 +39,7 @@ CASES = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", CASES)
 def test_the_log_is_that_of_the_closed_loop(case):
     team, deployment, control = CASES[case]

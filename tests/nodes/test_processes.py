@@ -68,6 +68,7 @@ def test_a_transport_needs_a_few_hundred_bytes_between_robots(tmp_path):
     assert sum(size for _, _, _, size in said) == SIZE
 
 
+@pytest.mark.slow
 def test_processes_with_another_plan_are_turned_away(capfd):
     scenario, plan = sampled("base")
     book = local_book(2)

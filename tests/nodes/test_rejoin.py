@@ -64,6 +64,7 @@ def nothing_touched(log):
     return min(log.workspace_clearance.min(), log.body_clearance.min()) > 0.05
 
 
+@pytest.mark.slow
 def test_a_robot_that_is_killed_and_started_again_rejoins_and_the_team_arrives():
     log, facts, told = run_with("base", {FAULT: kill(1)})
     assert log.reached
@@ -92,6 +93,7 @@ def test_a_robot_that_is_killed_and_started_again_rejoins_and_the_team_arrives()
         verify_log(replace(log, object_pose=moved), *against, braked=True)
 
 
+@pytest.mark.slow
 def test_a_supervisor_that_is_killed_and_started_again_learns_the_cell_and_nothing_else_changes():
     log, facts, _ = run_with("base", {FAULT: kill(SUPERVISOR)})
     scenario, plan = sampled("base")
@@ -103,6 +105,7 @@ def test_a_supervisor_that_is_killed_and_started_again_learns_the_cell_and_nothi
     assert sorted(set(log.cell_index.tolist())) == sorted(set(together.cell_index.tolist()))
 
 
+@pytest.mark.slow
 def test_a_robot_and_the_supervisor_that_are_killed_together_rejoin():
     log, facts, _ = run_with("three", {FAULT: kill(2, SUPERVISOR)})
     assert log.reached
@@ -110,6 +113,7 @@ def test_a_robot_and_the_supervisor_that_are_killed_together_rejoin():
     assert facts["restarts"] == {"robot 2": 1, "the supervisor": 1}
 
 
+@pytest.mark.slow
 def test_who_is_killed_too_often_is_named():
     log, _, _ = run_with("base", {FAULT: kill(1), FAULT + 140: kill(1)})
     assert not log.reached
@@ -117,6 +121,7 @@ def test_who_is_killed_too_often_is_named():
     assert nothing_touched(log)
 
 
+@pytest.mark.slow
 def test_a_paced_team_holds_while_a_robot_stands_still_and_goes_on_after_it():
     acts = {FAULT: send(1, signal.SIGSTOP), FAULT + 50: send(1, signal.SIGCONT)}
     log, facts, told = run_with("base", acts, pacing=Pacing(allowed=0.3))

@@ -30,6 +30,7 @@ def transport(tmp_path_factory):
     return task.scenario, plan, maps, task.problem.tree
 
 
+@pytest.mark.slow
 def test_whenever_the_drives_brake_the_team_rests_where_it_can_begin_a_cell_anew(transport):
     scenario, plan, maps = transport[:3]
     gaps = [(round(begin * 200), round(begin * 200) + 60) for begin in (0.8, 3.8, 8.0)]

@@ -52,6 +52,7 @@ def runs():
     return {type(gains).__name__: play(transitions, gains, start=START, step=2e-3) for gains in sets}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("gain_set", ["FixedGains", "ScheduledGains"])
 def test_every_cell_is_passed_inside_its_funnels(runs, gain_set):
     run = runs[gain_set]
@@ -67,6 +68,7 @@ def test_scheduled_gains_are_gentler(runs):
     assert np.all(fixed > 2.0 * scheduled)
 
 
+@pytest.mark.slow
 def test_the_energy_gate_tames_the_gains_of_table_2(runs):
     """Without the gate the next funnel begins while the last one still rings."""
     rushed = play(table_transitions(CORRECTED), FixedGains(), start=START, gated=False)

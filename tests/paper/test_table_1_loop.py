@@ -28,6 +28,7 @@ def test_the_plan_has_the_table_s_intervals_and_walks_through_the_hall():
     assert [transition.only_angles for transition in plan.transitions] == [False] * 29 + [True]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["table_2", "scheduled"])
 def test_every_equation_holds_on_every_step_of_thirty_cells(figures, name):
     gains = figures[name]

@@ -33,6 +33,7 @@ def stated(plan, name):
     return np.array([getattr(transition.tolerance, name) for transition in plan.transitions])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("departures", "count"), [(random_departures, 60), (worst_departures, 12)])
 def test_departures_within_the_budget_never_take_an_axis_farther_than_stated(base, departures, count):
     runs = [run_axes(base, MOBILE_BASE, departures(base, MOBILE_BASE, seed)) for seed in range(count)]

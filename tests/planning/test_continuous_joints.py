@@ -105,6 +105,7 @@ def test_limits_of_half_a_turn_are_kept_and_their_proof_is_refused_for_the_circl
         verify_proof(forged, turret(1.2, -1.2))
 
 
+@pytest.mark.slow
 def test_both_ways_round_are_proved_to_be_blocked():
     proof = refuted(turret(1.5, -1.5 + 4.0 * pi, back=True, strategy="cells"))
     ends = np.array([[part.lower[1], part.upper[1]] for part in proof.slices])

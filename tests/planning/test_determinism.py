@@ -5,6 +5,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 _SCRIPT = """
 import sys
 from pathlib import Path
@@ -36,6 +38,7 @@ def planned(directory: Path, hash_seed: str, threads: str) -> tuple[bytes, str]:
     return path.read_bytes(), done.stdout
 
 
+@pytest.mark.slow
 def test_hash_seeds_and_threads_change_no_byte(tmp_path: Path) -> None:
     first, second = planned(tmp_path, "0", "1"), planned(tmp_path, "4242", "2")
     assert first == second

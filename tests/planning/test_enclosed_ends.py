@@ -24,6 +24,7 @@ def behind_a_corridor(width: float) -> PlanningProblem:
     return replace(shelves, workspace=floor.simplify(0.0), goal_pose=corridor_problem().goal_pose + off)
 
 
+@pytest.mark.slow
 @pytest.mark.no_cover
 def test_a_bend_that_is_too_narrow_is_proved_from_the_walls_near_it() -> None:
     question = behind_a_corridor(0.76)

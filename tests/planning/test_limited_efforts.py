@@ -40,6 +40,7 @@ def limited(tmp_path_factory):
     return asked, found.plan
 
 
+@pytest.mark.slow
 def test_a_force_that_cannot_be_kept_is_refused_by_its_reason(tmp_path):
     """The position's part of it alone would be 49 N."""
     found = answer(task(tmp_path, base_force=50.0))

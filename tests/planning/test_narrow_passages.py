@@ -86,6 +86,7 @@ def test_the_team_is_sampled_only_where_the_object_alone_almost_fits(monkeypatch
         assert are_free(problem, tried.path).all() == (tried.short <= 0.0)
 
 
+@pytest.mark.slow
 @pytest.mark.no_cover
 def test_a_corridor_too_narrow_for_samples_is_found_and_sound():
     problem = transport(0.79)

@@ -23,7 +23,7 @@ def asked(monkeypatch):
     def play(*answers):
         left = list(answers)
 
-        def find_path(problem, progress=None, workers=1):
+        def find_path(problem, progress=None):
             questions.append(problem)
             return left.pop(0), REPORT
 

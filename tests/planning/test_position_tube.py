@@ -98,6 +98,7 @@ LIMITS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", LIMITS)
 def test_what_does_not_hold_is_said(name):
     scenario, plan = small_problem()

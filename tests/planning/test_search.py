@@ -143,6 +143,7 @@ def test_progress_is_told_and_may_interrupt() -> None:
     assert told == ["sampling paths"]
 
 
+@pytest.mark.slow
 @pytest.mark.no_cover
 def test_a_millimetre_of_room_is_found() -> None:
     """The corridor is three millimetres wider than one in which the object alone is proved to be stuck."""

@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from benchmarks.adversaries.crossings import discs_in_a_corridor
 from benchmarks.planner.family import corridor_problem
@@ -37,6 +38,7 @@ def two_bases(width):
     return replace(question, tree=ComponentTree((*others, last), question.tree.unchecked_pairs), start=start)
 
 
+@pytest.mark.slow
 def test_walls_that_squeeze_two_bases_together_close_a_corridor_with_few_slices(monkeypatch):
     monkeypatch.setattr("coop_drake.planning.cells.cells.Squeezes", Recorded)
     question = two_bases(0.99)

@@ -118,7 +118,7 @@ def test_team_carries_a_non_convex_object(outline, tmp_path):
 
 
 def called(folder, *arguments):
-    return CliRunner().invoke(app, ["object", *arguments, "--out", str(folder)])
+    return CliRunner().invoke(app, ["new", "object", *arguments, "--out", str(folder)])
 
 
 def test_command_line_writes_the_same_files_and_replaces_none(tmp_path):

@@ -1,6 +1,7 @@
 """Under-cells lie inside free space, free space inside over-cells, at a million configurations."""
 
 import numpy as np
+import pytest
 import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -40,6 +41,7 @@ def test_every_piece_stays_between_its_sweeps(data: st.DataObject) -> None:
             assert far.max() <= piece.shape.radius + 1e-11
 
 
+@pytest.mark.slow
 @MANY_SLICES
 @given(st.data())
 def test_under_cells_are_free_and_free_space_is_in_over_cells(data: st.DataObject) -> None:

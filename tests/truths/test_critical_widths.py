@@ -29,6 +29,7 @@ def test_just_below_the_critical_width_the_answer_is_a_proof(passage) -> None:
     assert answer.proved
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("offset", [0.0, 1e-4])
 @pytest.mark.parametrize("passage", PASSAGES[:3], ids=NAMES[:3])
 def test_near_the_critical_width_no_answer_is_wrong(passage, offset: float) -> None:

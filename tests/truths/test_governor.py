@@ -16,6 +16,7 @@ table_2 = (50.0, 5.0, 5.0)
 scheduled = [(k, np.sqrt(k), 0.8 * np.sqrt(k)) for k in (50.0, 400.0)]
 
 
+@pytest.mark.slow
 @settings(max_examples=20)
 @given(
     st.sampled_from([table_2, *scheduled]),

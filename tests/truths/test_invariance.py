@@ -30,6 +30,7 @@ SIMILARITIES = st.builds(
 )
 
 
+@pytest.mark.slow
 @settings(max_examples=9)
 @given(st.sampled_from(PASSAGES), st.sampled_from((0.02, -0.02)), SIMILARITIES)
 def test_a_passage_is_passed_or_blocked_wherever_it_stands(

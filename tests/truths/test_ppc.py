@@ -66,6 +66,7 @@ def test_the_energy_decays_as_predicted(funnel, time, fraction, v, kappa, gain, 
     assert numeric == pytest.approx(predicted, rel=1e-5, abs=noise + 1e-6 * value)
 
 
+@pytest.mark.slow
 @settings(max_examples=25)
 @given(
     st.sampled_from(["exponential", "quintic"]),

@@ -1,6 +1,7 @@
 """Answers for rigid bodies on ragged floors agree with an exact roadmap through layers of theta."""
 
 import numpy as np
+import pytest
 from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
 from shapely import Polygon
@@ -16,6 +17,7 @@ from tests.support.shapes import floors
 LAYERS = 60
 
 
+@pytest.mark.slow
 @settings(max_examples=8, suppress_health_check=list(HealthCheck))
 @given(floors(), st.integers(0, 1_000_000))
 def test_no_answer_contradicts_the_exact_one(floor: Polygon, seed: int) -> None:

@@ -19,6 +19,7 @@ ANSWERS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ANSWERS)
 def test_alterations_are_refused_where_they_are_false_and_accepted_where_they_are_true(kind: str) -> None:
     documents = answered(ANSWERS[kind]())

@@ -254,6 +254,7 @@ def value_at(document, way):
     return document
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("required", [False, True])
 @pytest.mark.parametrize("name", SCENARIOS)
 def test_every_entry_of_a_plan_is_compared_or_a_free_choice(name, required):

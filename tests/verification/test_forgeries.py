@@ -87,6 +87,7 @@ def test_a_gap_of_a_metre_between_cells_that_reach_far_away_is_seen(name, reach,
     assert refusal(proof, scenario(name), tmp_path)
 
 
+@pytest.mark.slow
 @pytest.mark.no_cover
 @SCENARIOS
 def test_honest_proofs_that_a_goal_is_blocked_hold_with_several_slices(name, tmp_path) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from functools import partial
 from math import ceil, inf
 
 from shapely.errors import ShapelyError
@@ -11,7 +10,6 @@ from shapely.errors import ShapelyError
 from coop_drake.answers.plan import Plan
 from coop_drake.errors import GeometryError, PatienceError, PlanError, StallError
 from coop_drake.planning.boxes.channel import Channel, CoveredPath
-from coop_drake.planning.copies import Copies
 from coop_drake.planning.execution.estimate import plan_time
 from coop_drake.progress import Progress
 
@@ -22,7 +20,6 @@ def quicker_plans(
     make: Callable[[CoveredPath], object],
     effort: float,
     progress: Progress | None,
-    copies: int = 0,
 ) -> Iterator[Plan]:
     """Yield plans along other sampled paths, each of them quicker than all before it.
 
@@ -33,26 +30,21 @@ def quicker_plans(
         effort: As in ``PlannerSettings``; the first plan has taken 1, and every other path takes at most 1.
         progress: Called with the best estimate and the fraction of the effort that is spent. If it raises
             PatienceError, no further path is tried.
-        copies: As ``Copies`` has it.
     """
     if not isinstance(found, CoveredPath):
         return
     best = plan_time(first) if isinstance(first, Plan) else inf
-    shares = [min(1.0, effort - number) for number in range(1, ceil(effort))]
-    works = [partial(_tried, found, make, number, share) for number, share in enumerate(shares, start=1)]
-    with Copies(works, copies if len(works) > 1 else 0) as plans:
-        results = iter(plans)
-        for number in range(1, 1 + len(works)):
-            if progress is not None:
-                so_far = f"; the transport takes {best:.1f} s so far" if best < inf else ""
-                try:
-                    progress(f"trying another path{so_far}", number / effort)
-                except PatienceError:
-                    return
-            made = next(results)
-            if made is not None and plan_time(made) < best:
-                best = plan_time(made)
-                yield made
+    for number in range(1, ceil(effort)):
+        if progress is not None:
+            so_far = f"; the transport takes {best:.1f} s so far" if best < inf else ""
+            try:
+                progress(f"trying another path{so_far}", number / effort)
+            except PatienceError:
+                return
+        made = _tried(found, make, number, min(1.0, effort - number))
+        if made is not None and plan_time(made) < best:
+            best = plan_time(made)
+            yield made
 
 
 def _tried(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import partial
 
@@ -16,7 +16,6 @@ from coop_drake.geometry.swept_tree import SweptTree
 from coop_drake.planning.boxes.boxes import Regions, make_channel
 from coop_drake.planning.boxes.certify import Certifier
 from coop_drake.planning.boxes.channel import Channel, CoveredPath
-from coop_drake.planning.copies import Copies
 from coop_drake.planning.questions.margins import exact_footprint, marginal_workspace
 from coop_drake.planning.sampling.clear_paths import (
     another_candidate,
@@ -72,24 +71,22 @@ class SampledSearch:
     def attempts(
         self,
         number: int,
-        copies: int = 0,
         progress: Callable[[float], None] | None = None,
         part: tuple[int, ...] | None = None,
-    ) -> Copies[Tried]:
+    ) -> Iterator[Tried]:
         """Sample some paths and cover each of them at margin zero, all with other samples.
 
         Args:
             number: How many.
-            copies: As ``Copies`` has it; attempts in copies of this process report no progress.
             progress: Called with the fraction of an attempt that is done.
             part: Robots for which, with the object alone, a path seems hard to find: it is sampled first.
 
         Returns:
-            What comes of the attempts, each for ``taken``, which counts it.
+            What comes of the attempts, each made when it is asked for; ``taken`` counts it.
         """
-        first, report = self._attempts + 1, None if copies else progress
-        works = (partial(self._attempt, k, report, part=part) for k in range(first, first + number))
-        return Copies([partial(self._counted, work) for work in works], copies)
+        first = self._attempts + 1
+        works = [partial(self._attempt, k, progress, part=part) for k in range(first, first + number)]
+        return map(self._counted, works)
 
     def taken(self, tried: Tried) -> BoxSequence | None:
         """Count an attempt; returns its boxes, None if no path was found or covered."""
@@ -158,7 +155,6 @@ class SampledSearch:
     def narrow_attempt(
         self,
         number: int,
-        copies: int = 0,
         progress: Callable[[float], None] | None = None,
         *,
         object_first: bool = False,
@@ -167,7 +163,6 @@ class SampledSearch:
 
         Args:
             number: How many such attempts there were before.
-            copies: Copies of this process that work.
             progress: Called with the fraction of an attempt that is done.
             object_first: Whether a path of the object alone is to be found before one of the team.
 
@@ -176,14 +171,13 @@ class SampledSearch:
         """
         if not self._start_inside:
             return None
-        tries = self._narrow.tries(number, None if copies else progress, object_first=object_first)
         done: list[Tried] = []
-        with Copies([partial(self._counted, one) for one in tries], copies) as results:
-            for tried in results:
-                self.slices += tried.trials
-                if tried.failed or tried.found is not None:
-                    return tried.found
-                done.append(tried)
+        for one in self._narrow.tries(number, progress, object_first=object_first):
+            tried = self._counted(one)
+            self.slices += tried.trials
+            if tried.failed or tried.found is not None:
+                return tried.found
+            done.append(tried)
         try:
             return self._narrow.through_middle(done)
         except (GeometryError, ShapelyError):

@@ -11,7 +11,7 @@ A sampled path is then moved away from the walls and covered again at the larges
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from contextlib import suppress
 from time import thread_time
 
@@ -25,7 +25,6 @@ from coop_drake.planning.boxes.channel import Channel, CoveredPath, NoChannel, m
 from coop_drake.planning.cells.ends import within_limits
 from coop_drake.planning.cells.events import Watch
 from coop_drake.planning.cells.exploration import Verdict
-from coop_drake.planning.copies import Copies
 from coop_drake.planning.proofs.blocked_goals import blocked_goal, touch_at_goal
 from coop_drake.planning.proofs.clearance_bound import clearance_bound
 from coop_drake.planning.proofs.enclosed_ends import refuted_at_an_end
@@ -89,7 +88,6 @@ def find_path(
     watch: Watch | None = None,
     *,
     route: FloatArray | None = None,
-    workers: int = 1,
 ) -> tuple[CoveredPath | Channel | NoChannel, SearchReport]:
     """Find a path that boxes cover, or prove that there is none; then look for a larger margin.
 
@@ -101,7 +99,6 @@ def find_path(
         progress: Called with a phase and the fraction of it that is done.
         watch: Called with the events of explorations.
         route: Route for a disc, along which alone paths are sampled, shape (k, 2) [m]; it proves nothing.
-        workers: Processes at a time, see ``plan``.
 
     Returns:
         A sampled path, the channel of an exploration, or why there is neither, and a report.
@@ -116,11 +113,11 @@ def find_path(
         return NoChannel(True, beyond, proof), SearchReport(slices)
     unit = usual_unit(problem.tree)
     if unit == 1.0:
-        return _answered(problem, progress, watch, route=route, workers=workers)
+        return _answered(problem, progress, watch, route=route)
     scale = Rescaling(problem, unit)
     question, seen = scale.question(), scale.watched(watch)
     route = None if route is None else route / unit
-    answer, report = _answered(question, progress, seen, unit, route=route, workers=workers)
+    answer, report = _answered(question, progress, seen, unit, route=route)
     return scale.answer(answer), report
 
 
@@ -131,11 +128,10 @@ def _answered(
     unit: float = 1.0,
     *,
     route: FloatArray | None,
-    workers: int,
 ) -> tuple[CoveredPath | Channel | NoChannel, SearchReport]:
     if problem.settings.strategy != "portfolio":
         return search_by_cells(problem, progress, watch)
-    return _Search(problem, progress, watch, unit, route=route, workers=workers).run()
+    return _Search(problem, progress, watch, unit, route=route).run()
 
 
 class _Search:
@@ -147,7 +143,6 @@ class _Search:
         watch: Called with the events of explorations.
         unit: The question's unit of length, for sentences [m].
         route: Route along which alone paths are sampled, shape (k, 2).
-        workers: Processes at a time.
     """
 
     def __init__(
@@ -158,11 +153,10 @@ class _Search:
         unit: float,
         *,
         route: FloatArray | None,
-        workers: int,
     ) -> None:
         self._began, self._unit, self._route = thread_time(), unit, route
         self._first_plan: float | None = None
-        self._problem, self._progress, self._watch, self._workers = problem, progress, watch, workers
+        self._problem, self._progress, self._watch = problem, progress, watch
         self._samples = SampledSearch(within_limits(problem), route)
         self._proofs = Proofs(problem, watch)
         self._other_slices = self._narrow_attempts = 0
@@ -209,15 +203,15 @@ class _Search:
         if found is None and object_blocked and self._proofs.refutation is None:
             self._explored(budget // OBJECT_BUDGET_DIVISOR, robots=0)
         while found is None:
-            with self._attempts(ATTEMPTS_PER_ROUND, self._workers - 1) as attempts:
-                verdict = self._explored(each)
-                refutation = self._proofs.refutation
-                if refutation is not None:
-                    return NoChannel(True, refutation.reason, refutation.proof)
-                if verdict is Verdict.FOUND:
-                    self._first_plan = thread_time() - self._began
-                    return self._around(explored_channel(self._problem, self._proofs.boxes()))
-                found = self._first_of(attempts)
+            attempts = self._attempts(ATTEMPTS_PER_ROUND)  # By what was blocked before this exploration.
+            verdict = self._explored(each)
+            refutation = self._proofs.refutation
+            if refutation is not None:
+                return NoChannel(True, refutation.reason, refutation.proof)
+            if verdict is Verdict.FOUND:
+                self._first_plan = thread_time() - self._began
+                return self._around(explored_channel(self._problem, self._proofs.boxes()))
+            found = self._first_of(attempts)
             if found is None and 0 < self._narrow_attempts < NARROW_ATTEMPTS:
                 found = self._narrow_sampled()
             if found is None and (verdict is Verdict.RESOLUTION or self._proofs.slices >= budget):
@@ -227,19 +221,12 @@ class _Search:
 
     def _sampled(self, attempts: int) -> BoxSequence | None:
         """Sample paths and cover them with boxes; fewer times if the object alone seems blocked."""
-        with self._attempts(attempts, self._copies if attempts > 1 else 0) as results:
-            return self._first_of(results)
+        return self._first_of(self._attempts(attempts))
 
-    @property
-    def _copies(self) -> int:
-        """Copies of this process that work while it waits."""
-        return self._workers if self._workers > 1 else 0
+    def _attempts(self, number: int) -> Iterator[Tried]:
+        return self._samples.attempts(number, self._phase("sampling paths"), self._proofs.blocked_part)
 
-    def _attempts(self, number: int, copies: int) -> Copies[Tried]:
-        phase, part = self._phase("sampling paths"), self._proofs.blocked_part
-        return self._samples.attempts(number, copies, phase, part)
-
-    def _first_of(self, attempts: Copies[Tried]) -> BoxSequence | None:
+    def _first_of(self, attempts: Iterator[Tried]) -> BoxSequence | None:
         """The first boxes of some attempts; attempts end where the object alone seems blocked."""
         self._phase("sampling paths")(0.0)
         for tried in attempts:
@@ -260,7 +247,7 @@ class _Search:
     def _narrow_sampled(self) -> BoxSequence | None:
         """Sample paths through narrow passages, other ones each time."""
         phase, first = self._phase("sampling narrow passages"), self._proofs.blocked_part == ()
-        found = self._samples.narrow_attempt(self._narrow_attempts, self._copies, phase, object_first=first)
+        found = self._samples.narrow_attempt(self._narrow_attempts, phase, object_first=first)
         self._narrow_attempts += 1
         if found is not None:
             self._first_plan = thread_time() - self._began

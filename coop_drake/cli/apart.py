@@ -1,0 +1,253 @@
+"""The commands below apart: the processes of a team whose robots run apart, and their keys."""
+
+from __future__ import annotations
+
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+from rich.markup import escape
+
+from coop_drake.cli.options import (
+    FaultsFile,
+    FreeRunning,
+    FreshMaps,
+    GainsName,
+    Live,
+    Machine,
+    NoFigures,
+    Quiet,
+    Rejoin,
+    ResultsFolder,
+    ScenarioPath,
+    Verbose,
+    Wait,
+    out_folder,
+)
+from coop_drake.cli.reporter import ExitCode, Reporter, reporting
+from coop_drake.cli.results import ResultFolder
+from coop_drake.cli.run import carry_out, faults_of, live_page
+from coop_drake.cli.simulate import read_plan
+from coop_drake.cli.task import Task, map_cells, read_task
+from coop_drake.nodes.states import REJOIN
+from coop_drake.viz.drawing_processes import DrawingProcesses
+
+if TYPE_CHECKING:
+    from coop_drake.answers import Plan
+    from coop_drake.messages import AddressBook, KeyPair
+
+EXAMPLES = (
+    ("apart keys --robots 2 --out keys", "for processes on this machine that prove who they are"),
+    ("apart keys --robots 3 --world 192.168.1.10 --supervisor 192.168.1.11", "for several machines"),
+    ("apart supervisor real.scenario.yaml --addresses keys/addresses.yaml", "be the supervisor"),
+    ("apart robot real.scenario.yaml 1", "be the second robot"),
+    (
+        "apart world real.scenario.yaml",
+        "with a control rate in it: wait for supervisor and robots, simulate, record",
+    ),
+)
+
+_FIRST_PORT = 5600
+"""Port on which the world's first channel listens where none is named."""
+
+_ADDRESSES = Path("keys") / "addresses.yaml"
+"""Where ``apart keys`` writes the address book."""
+
+apart_app = typer.Typer(
+    no_args_is_help=True,
+    rich_markup_mode="rich",
+    help="Run world, supervisor and robots as processes of their own, on one machine or on several.",
+)
+"""The command with those below it."""
+
+Addresses = Annotated[
+    Path,
+    typer.Option("--addresses", metavar="FILE", help="Address book, the same for all; see `apart keys`."),
+]
+OwnKey = Annotated[
+    Path | None,
+    typer.Option(
+        "--key", metavar="FILE", help="This process' private key; that beside the address book by default."
+    ),
+]
+PlanFile = Annotated[
+    Path | None,
+    typer.Option(
+        "--plan",
+        metavar="FILE",
+        help="The plan, the same for all; plan.json in the scenario's results by default.",
+    ),
+]
+
+
+@apart_app.command("keys")
+def keys_command(
+    robots: Annotated[int, typer.Option("--robots", metavar="N", help="Number of robots.")] = 2,
+    world: Annotated[
+        str, typer.Option("--world", metavar="A.B.C.D", help="Address of the machine with the world.")
+    ] = "127.0.0.1",
+    supervisor: Annotated[
+        str | None,
+        typer.Option(
+            "--supervisor",
+            metavar="A.B.C.D",
+            help="Address of the machine with the supervisor; that of the world by default.",
+        ),
+    ] = None,
+    port: Annotated[
+        int, typer.Option("--port", metavar="P", help="First of three ports that processes listen on.")
+    ] = _FIRST_PORT,
+    out: Annotated[Path, out_folder("A new folder for the files.")] = Path("keys"),
+    machine: Machine = False,
+    quiet: Quiet = False,
+) -> None:
+    """Write an address book with public keys, and a private key for each process, for its owner alone."""
+    with reporting(machine=machine, quiet=quiet) as reporter:
+        from coop_drake.errors import ScenarioError
+        from coop_drake.messages import make_team_files
+        from coop_drake.typed_data import DataError
+
+        try:
+            files = make_team_files(out, robots, (world, supervisor or world), port)
+        except DataError as error:
+            raise ScenarioError("the options", error.key, error.value, error.allowed) from error
+        reporter.facts.update(files=[str(path) for path in files])
+        reporter.say(f"Written: {', '.join(escape(str(path)) for path in files)}")
+        reporter.say(
+            f"Next: copy {escape(files[0].name)} to every machine, and each .key to that of its process"
+        )
+
+
+@apart_app.command("supervisor")
+def supervisor_command(
+    scenario: ScenarioPath,
+    addresses: Addresses = _ADDRESSES,
+    key: OwnKey = None,
+    plan: PlanFile = None,
+    gains: GainsName = None,
+    faults: FaultsFile = None,
+    machine: Machine = False,
+    quiet: Quiet = False,
+) -> None:
+    """Be the supervisor of a team, until the world says that the run is over."""
+    with reporting(machine=machine, quiet=quiet) as reporter:
+        from coop_drake.messages import SUPERVISOR
+        from coop_drake.nodes import run_supervisor
+
+        task, found = _problem_of(scenario, gains, plan, reporter)
+        book, keys = _place_of(task, addresses, key, SUPERVISOR)
+        reporter.say("The supervisor looks for the world and waits for all robots")
+        outcome = run_supervisor(task.scenario, found, book, keys=keys, faults=faults_of(task, faults))
+        reporter.facts.update(outcome=outcome)
+        reporter.code = ExitCode.DONE if outcome == 0 else ExitCode.FAILED_RUN
+
+
+@apart_app.command("robot")
+def robot_command(
+    scenario: ScenarioPath,
+    robot: Annotated[int, typer.Argument(metavar="K", min=0, help="Which robot, counted from 0.")],
+    addresses: Addresses = _ADDRESSES,
+    key: OwnKey = None,
+    plan: PlanFile = None,
+    gains: GainsName = None,
+    faults: FaultsFile = None,
+    machine: Machine = False,
+    quiet: Quiet = False,
+) -> None:
+    """Be one robot of a team, until the world says that the run is over."""
+    with reporting(machine=machine, quiet=quiet) as reporter:
+        from coop_drake.nodes import robots_of, run_robot
+
+        task, found = _problem_of(scenario, gains, plan, reporter)
+        robots = robots_of(task.scenario)
+        if robot >= robots:
+            raise typer.BadParameter(f"K = {robot}: the team has robots 0 to {robots - 1}.")
+        book, keys = _place_of(task, addresses, key, robot)
+        maps = map_cells(task, found, reporter)
+        reporter.say(f"Robot {robot} looks for the world and the supervisor")
+        outcome = run_robot(
+            task.scenario, found, maps, robot, book, keys=keys, faults=faults_of(task, faults)
+        )
+        reporter.facts.update(robot=robot, outcome=outcome)
+        reporter.code = ExitCode.DONE if outcome == 0 else ExitCode.FAILED_RUN
+
+
+@apart_app.command("world")
+def world_command(
+    scenario: ScenarioPath,
+    addresses: Addresses = _ADDRESSES,
+    key: OwnKey = None,
+    plan: PlanFile = None,
+    out: ResultsFolder = None,
+    gains: GainsName = None,
+    faults: FaultsFile = None,
+    free_running: FreeRunning = False,
+    rejoin: Rejoin = REJOIN,
+    fresh_maps: FreshMaps = False,
+    live: Live = False,
+    wait: Wait = False,
+    no_figures: NoFigures = False,
+    machine: Machine = False,
+    quiet: Quiet = False,
+    verbose: Verbose = False,
+) -> None:
+    """Simulate and record a team whose robots and supervisor are processes of their own."""
+    with reporting(machine=machine, quiet=quiet, verbose=verbose) as reporter:
+        from coop_drake.messages import WORLD
+        from coop_drake.nodes import simulate_world, wall_clock
+
+        task, found = _problem_of(scenario, gains, plan, reporter)
+        folder = ResultFolder.of(task.name, out, "simulation")
+        book, keys = _place_of(task, addresses, key, WORLD)
+        reporter.say("The world waits for the supervisor and all robots")
+        with (
+            DrawingProcesses(figures=not no_figures) as drawing,
+            live_page(task, found, reporter, live=live, wait=wait) as page,
+        ):
+            world = partial(
+                simulate_world,
+                book=book,
+                keys=keys,
+                pacing=wall_clock(task.scenario) if free_running else None,
+                rejoin=rejoin,
+                faults=faults_of(task, faults),
+                report=reporter.facts.update,
+                tell=reporter.say,
+            )
+            reporter.code = carry_out(
+                task, found, folder, reporter, drawing, page, world, fresh_maps=fresh_maps
+            )
+
+
+def _problem_of(
+    scenario: Path, gains: str | None, plan: Path | None, reporter: Reporter
+) -> tuple[Task, Plan]:
+    """Read scenario and plan.
+
+    Raises:
+        ScenarioError: The scenario is wrong, or its robots do not compute at common samples.
+        PlanError: The file is no plan, or belongs to another scenario.
+    """
+    from coop_drake.diagram import control_period
+
+    task = read_task(scenario, gains, reporter)
+    control_period(task.scenario)
+    return task, read_plan(task, plan or ResultFolder.of(task.name, None).plan, reporter)
+
+
+def _place_of(
+    task: Task, addresses: Path, key: Path | None, index: int
+) -> tuple[AddressBook, KeyPair | None]:
+    """Read the address book and the private key of a process, by its index in messages.
+
+    Raises:
+        ScenarioError: A file is wrong, or the book is for another number of robots.
+    """
+    from coop_drake.messages import load_address_book, load_own_keys
+    from coop_drake.messages.team_files import key_file
+    from coop_drake.nodes import robots_of
+
+    book = load_address_book(addresses, robots_of(task.scenario))
+    beside = addresses.parent / key_file(index)
+    return book, load_own_keys(book, index, key or (beside if beside.exists() else None))
