@@ -1,6 +1,4 @@
 from .accuracy import MapAccuracy
-from .blunting import blunted
-from .cuts import cut_open
 from .harmonic_map import HarmonicMap
 from .store import MapStore
 from .streamlines import Streamlines, trace_streamlines
@@ -12,7 +10,5 @@ __all__ = [
     "MapStore",
     "Streamlines",
     "VelocityField",
-    "blunted",
-    "cut_open",
     "trace_streamlines",
 ]

@@ -73,6 +73,6 @@ def check_certainty(harmonic_map: HarmonicMap) -> None:
         x, y = centres[np.argmax(np.where(unknown, distance, -1.0))]
         raise FieldError(
             f"the direction of the field is not known in {100.0 * part:.2g} % of the region, for example at "
-            f"({x:.6g}, {y:.6g}) m: there the Jacobian's determinant is below the map's error; cut the "
-            "domain open (`cut_open`), move the goal, or ask for a smaller tolerance"
+            f"({x:.6g}, {y:.6g}) m: there the Jacobian's determinant is below the map's error; "
+            "join the holes to the outer ring, move the goal, or ask for a smaller tolerance"
         )

@@ -144,7 +144,7 @@ def _refuse_spikes(outline: Outline) -> None:
         place = outline.vertices[worst] + outline.centre
         raise UnmappableError(
             f"the corner at ({place.real:.6g}, {place.imag:.6g}) m has an interior angle of {angle:.3g} "
-            f"degrees; between {_SHARPEST:g} and {360.0 - _SHARPEST:g} are allowed: `blunted` cuts it off",
+            f"degrees; between {_SHARPEST:g} and {360.0 - _SHARPEST:g} are allowed; cut it off",
             (place.real, place.imag),
             angle=angle,
         )

@@ -28,7 +28,7 @@ class VelocityField:
     almost everywhere it arrives. The field is smooth in the interior except at the goal's edge, where the
     speed has a kink. It is not Lipschitz near a vertex that juts into the domain: the direction turns around
     it within any distance, however small. At most two streamlines end on a hole that collapses, and those
-    beside them are slow there; `cut_open` removes the holes of a domain.
+    beside them are slow there.
     Points outside the map's region get the direction of the nearest boundary point, never NaN.
 
     Args:

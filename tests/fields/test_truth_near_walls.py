@@ -5,7 +5,7 @@ import pytest
 import shapely
 from shapely import Point, box
 
-from coop_drake.fields import HarmonicMap, cut_open
+from coop_drake.fields import HarmonicMap
 from coop_drake.geometry import BoundaryDistance
 from tests.support import domains
 
@@ -16,7 +16,6 @@ DOMAINS = {
     "square": domains.square(),
     "U corridor": domains.u_corridor(),
     "warehouse": (WAREHOUSE, GOAL),
-    "cut open": (cut_open(HALL.difference(box(1.5, 0.7, 2.5, 1.3)), Point(3, 1)), Point(3, 1)),
     "maze": domains.maze(6),
     "Minkowski, mitre": (WAREHOUSE.buffer(-0.15, join_style="mitre"), GOAL),
     "Minkowski, round": (WAREHOUSE.buffer(-0.15, quad_segs=3), GOAL),
