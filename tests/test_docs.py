@@ -17,7 +17,7 @@ from coop_drake.systems import AxisPpc
 from coop_drake.typed_data import field_types
 from docs.generate.__main__ import PAGES
 from docs.generate.api_pages import api_pages
-from docs.generate.links import for_site
+from docs.generate.links import first_page, for_site
 from docs.generate.port_tables import as_markdown
 from docs.generate.scenario_keys import sections
 from tests.support.small_loop import joint_names, small_maps, small_scenario
@@ -177,3 +177,8 @@ def test_every_room_has_a_page():
     assert set(pages) == rooms | {"coop_drake"}
     assert "::: coop_drake.fields.harmonic_map\n" in pages["fields"]
     assert "kernels" not in "".join(pages.values())
+
+
+def test_the_readme_is_the_first_page_without_links_that_the_site_cannot_follow():
+    page = first_page("[a](docs/b.md) ![c](docs/d.png) [e](models/f.md) [g](https://h)")
+    assert page == "[a](b.md) ![c](d.png) e [g](https://h)"

@@ -18,7 +18,7 @@ from typing import Any
 import yaml
 
 from docs.generate.api_pages import api_pages
-from docs.generate.links import for_site
+from docs.generate.links import first_page, for_site
 from docs.generate.message_page import message_page
 from docs.generate.notebook_pages import write_notebook_pages
 from docs.generate.scenario_page import campaign_page, scenario_page
@@ -42,6 +42,8 @@ def main(site: Path, notebooks: Path | None = None) -> int:
     shutil.rmtree(sources, ignore_errors=True)
     kept_out = shutil.ignore_patterns("generate", "gallery", "*.py", "__pycache__")
     shutil.copytree(ROOT / "docs", sources / "pages", ignore=kept_out)
+    readme = (ROOT / "README.md").read_text(encoding="utf-8")
+    (sources / "pages" / "index.md").write_text(first_page(readme), encoding="utf-8")
     for path in (sources / "pages").rglob("*.md"):
         place = PurePosixPath(path.relative_to(sources / "pages").as_posix())
         path.write_text(for_site(path.read_text(encoding="utf-8"), place), encoding="utf-8")
@@ -60,17 +62,8 @@ def main(site: Path, notebooks: Path | None = None) -> int:
     handler["paths"] = [str(ROOT)]
     handler["options"]["extensions"] = [str(HERE / "port_tables.py")]
     (sources / "mkdocs.yml").write_text(yaml.safe_dump(settings, sort_keys=False), encoding="utf-8")
-    command = [
-        sys.executable,
-        "-m",
-        "zensical",
-        "build",
-        "--clean",
-        "--strict",
-        "-f",
-        str(sources / "mkdocs.yml"),
-    ]
-    code = subprocess.run(command, check=False).returncode
+    build = ["zensical", "build", "--clean", "--strict", "-f", str(sources / "mkdocs.yml")]
+    code = subprocess.run([sys.executable, "-m", *build], check=False).returncode
     if code == 0:
         shutil.rmtree(site, ignore_errors=True)
         (sources / "site").rename(site)

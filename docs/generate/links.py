@@ -1,12 +1,13 @@
-"""Adapts links for the site: pages are read in the repository and in the site."""
+"""Adapts links for the site: pages and README are read in the repository and in the site."""
 
 from __future__ import annotations
 
 import re
 from pathlib import PurePosixPath
 
-__all__ = ["for_site"]
+__all__ = ["first_page", "for_site"]
 
+_OUTSIDE = re.compile(r"(?<!!)\[([^\]]+)\]\((?!https?:|docs/)[^)]+\)")
 _PACKAGE = re.compile(r"\]\((?:\.\./)+coop_drake/(\w+)\)")
 
 
@@ -19,3 +20,8 @@ def for_site(text: str, page: PurePosixPath) -> str:
     """
     up = "../" * (len(page.parts) - 1)
     return _PACKAGE.sub(lambda link: f"]({up}reference/api/{link[1]}.md)", text)
+
+
+def first_page(readme: str) -> str:
+    """Return the README as the site's first page; links that the site cannot follow are text."""
+    return _OUTSIDE.sub(r"\1", readme).replace("](docs/", "](")
