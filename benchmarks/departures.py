@@ -104,6 +104,7 @@ CASES: Mapping[str, Case] = {
     ),
     "Coulomb friction": Case({"floor": {"coulomb_friction": 10.0}}, {"floor": {"coulomb_friction": 50.0}}),
     "viscous friction": Case({"floor": {"viscous_friction": 20.0}}, {"floor": {"viscous_friction": 300.0}}),
+    "friction of joints": Case({"joint_friction": {"coulomb": 0.1}}, {"joint_friction": {"coulomb": 10.0}}),
     "slope": Case({"floor": {"slope": 0.01745}}, {"floor": {"slope": 0.2}}),
     "push": Case(_pushed(20.0), _pushed(300.0)),
     "start offset": Case(

@@ -114,6 +114,7 @@ class LoopDepartures(NamedTuple):
         odometry: Factors of the measured rates of bases, shape (N,) [-].
         limits: Largest efforts, of every robot those of ``limit_efforts``, shape (2 N + n,) [N, N m].
         floor: Coulomb friction [N], viscous friction [N s/m], acceleration of gravity along x [m/s^2], (3,).
+        friction: Coulomb [N m or N] and viscous friction [N m s or N s/m] of every joint, shape (2,).
         pushes: Place in ``LoopPlant.bases``, force [N], torque [N m], begin and end [s], shape (., 6).
         hearing: Errors of the clocks [s], and how late switches are heard [periods], shape (2, N).
         silences: Begin and end [s], and 0 for motors that work, 1 for held ones, 2 for limp ones, (3, N).
@@ -130,6 +131,7 @@ class LoopDepartures(NamedTuple):
     odometry: FloatArray
     limits: FloatArray
     floor: FloatArray
+    friction: FloatArray
     pushes: FloatArray
     hearing: FloatArray
     silences: FloatArray

@@ -93,6 +93,7 @@ def departures_of(transport: CompiledTransport, deployment: Deployment) -> LoopD
         odometry=np.array([1.0 + own.odometry_scale for own in robots]),
         limits=np.concatenate([effort_limits(deployment, n) for n in joints]),
         floor=np.array([floor.coulomb_friction, floor.viscous_friction, downhill(floor.slope)]),
+        friction=np.array([deployment.joint_friction.coulomb, deployment.joint_friction.viscous]),
         pushes=np.array(pushes, dtype=float).reshape(-1, 6),
         hearing=np.array(hearing, dtype=float),
         silences=_silences(deployment, names),

@@ -9,8 +9,8 @@ import numpy as np
 from coop_drake.compiled import compiled
 from coop_drake.compiled_loop.arrays import LoopDepartures, LoopMemory, LoopPlant
 from coop_drake.laws.actuators import lag_behind
-from coop_drake.laws.blocked_wheels import BlockedRoom, blocked_room, hold_blocked
 from coop_drake.laws.friction import base_friction
+from coop_drake.laws.sticking import StickingRoom, stick, sticking_room
 from coop_drake.laws.team_dynamics import TeamWork, team_accelerations, team_work
 from coop_drake.systems.team_kernels import FusedTeam, read_own
 from coop_drake.tree.pose import FloatArray
@@ -33,7 +33,7 @@ class MotionRoom(NamedTuple):
         efforts: Of the joints, at the places of their rates, shape (3 + n,) [N m or N].
         robot: State of a robot with the most joints that there can be, shape (2 (3 + n),).
         work: Of the equations of motion.
-        floor: Of the floor's wrenches on blocked bases.
+        sticking: Of blocked wheels and of the friction of joints.
         blocked: 1 for bases with blocked wheels, else 0, shape (N,).
     """
 
@@ -44,7 +44,7 @@ class MotionRoom(NamedTuple):
     efforts: FloatArray
     robot: FloatArray
     work: TeamWork
-    floor: BlockedRoom
+    sticking: StickingRoom
     blocked: FloatArray
 
 
@@ -53,9 +53,9 @@ def motion_room(robots: int, plant: LoopPlant) -> MotionRoom:
     """Return room for a team of so many robots."""
     n = plant.tree.shape[0] + 2
     acting, states, wrenches = np.empty(3 * robots + n - 3), np.empty((3, 2 * n)), np.empty((robots + 1, 3))
-    floor, blocked = blocked_room(plant.tree.shape[0], robots), np.zeros(robots)
+    sticking, blocked = sticking_room(plant.tree.shape[0], robots), np.zeros(robots)
     return MotionRoom(
-        acting, states, np.empty(n), wrenches, np.zeros(n), np.empty(2 * n), team_work(plant.tree), floor,
+        acting, states, np.empty(n), wrenches, np.zeros(n), np.empty(2 * n), team_work(plant.tree), sticking,
         blocked,
     )  # fmt: skip
 
@@ -69,7 +69,8 @@ def advance(
 
     Efforts follow what is held as exponentials, exactly. A step of 5 ms errs by 1e-8 of the distances moved.
     """
-    period, n, any_blocked = departures.times[0], memory.state.size // 2, False
+    period, n = departures.times[0], memory.state.size // 2
+    sticks = departures.friction[0] > 0.0 or departures.friction[1] > 0.0
     state, start, change, slopes = room.states[0], room.states[1], room.states[2], room.slopes
     for i in range(room.acting.size):
         room.acting[i] = memory.efforts[1, i]
@@ -77,16 +78,16 @@ def advance(
         state[i], start[i], change[i] = memory.state[i], memory.state[i], 0.0
     for k in range(room.blocked.size):
         room.blocked[k] = 1.0 if _within(departures.blocked[:, k], sample, period) else 0.0
-        any_blocked = any_blocked or room.blocked[k] > 0.0
+        sticks = sticks or room.blocked[k] > 0.0
     for stage in range(4):
         ahead = 0.0 if stage == 0 else period if stage == 3 else 0.5 * period
         if stage != 2:  # Efforts are those of stage 1.
             lag_behind(departures.times[2], ahead, memory.efforts[0], room.acting, memory.efforts[1])
         _drive(sample, sample * period + ahead, state, team, plant, departures, memory, room)
-        if any_blocked:
-            hold_blocked(
-                plant.tree, plant.bases, plant.places, room.blocked, room.efforts, departures.floor[2], state,
-                room.work, room.floor, slopes, room.wrenches,
+        if sticks:
+            stick(
+                plant.tree, plant.bases, plant.places, room.blocked, departures.friction, room.efforts,
+                departures.floor[2], state, room.work, room.sticking, slopes, room.wrenches,
             )  # fmt: skip
         else:
             team_accelerations(

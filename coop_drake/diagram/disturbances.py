@@ -1,4 +1,4 @@
-"""Forces on a team that are not its own: floor, failing wheels, pushes from outside."""
+"""Forces on a team that are not its own: floor, failing wheels, friction of joints, pushes from outside."""
 
 from __future__ import annotations
 
@@ -7,13 +7,13 @@ from math import inf, sin
 
 import numpy as np
 from pydrake.systems.framework import DiagramBuilder, OutputPort
-from pydrake.systems.primitives import Adder, MatrixGain, TrajectorySource
+from pydrake.systems.primitives import Adder, Demultiplexer, MatrixGain, TrajectorySource
 from pydrake.trajectories import PiecewisePolynomial
 
 from coop_drake.errors import ScenarioError
 from coop_drake.plant import TeamPlant, read_component_tree, read_team_tree
-from coop_drake.scenario import Deployment, Floor, Push
-from coop_drake.systems import BlockedBases, FloorFriction, WheelSlips
+from coop_drake.scenario import Deployment, Floor, JointFriction, Push
+from coop_drake.systems import FloorFriction, Sticking, WheelSlips
 from coop_drake.tree.pose import FloatArray
 
 _GRAVITY = 9.80665
@@ -41,7 +41,8 @@ def add_disturbances(
 ) -> OutputPort:
     """Add friction and pushes to the wrenches on all bases, and pushes on the object behind them.
 
-    Slipping wheels take their share off what the actuators give; blocked ones act on the sum of all.
+    Slipping wheels take their share off what the actuators give; blocked ones act on the sum of all, and so
+    does the friction of joints, which the plant gets as generalized forces.
 
     Args:
         builder: Receives the blocks.
@@ -55,7 +56,7 @@ def add_disturbances(
         Wrenches on all bases, and where there are pushes, the one on the object at L: size 3 N or 3 N + 3.
 
     Raises:
-        ScenarioError: Wheels are blocked in a team with springs.
+        ScenarioError: Wheels are blocked or joints have friction in a team with springs.
     """
     floor, size, own = deployment.floor, wrenches.size(), [robot.name for robot in team.robots]
     slips, blocked = wheel_slips(deployment, own), blocked_times(deployment, own)
@@ -77,8 +78,8 @@ def add_disturbances(
         builder.Connect(wrenches, on_object.get_input_port())
         pushes = builder.AddNamedSystem("pushes", TrajectorySource(_pushes(deployment.pushes, names)))
         wrenches = _sum(builder, "pushed", on_object.get_output_port(), pushes.get_output_port())
-    if np.isfinite(blocked[0]).any():
-        wrenches = _block(builder, team, blocked, wrenches, torques)
+    if np.isfinite(blocked[0]).any() or deployment.joint_friction != JointFriction():
+        wrenches = _stick(builder, team, blocked, wrenches, torques)
     return wrenches
 
 
@@ -102,26 +103,32 @@ def wheel_slips(deployment: Deployment, names: Sequence[str]) -> FloatArray:
     ]).T.copy()  # fmt: skip
 
 
-def _block(
+def _stick(
     builder: DiagramBuilder, team: TeamPlant, times: FloatArray, wrenches: OutputPort, torques: OutputPort
 ) -> OutputPort:
-    """Add the wrenches of the floor on bases with blocked wheels.
+    """Add the wrenches of the floor on bases with blocked wheels, and the friction of joints.
 
     Raises:
         ScenarioError: The team has springs.
     """
+    deployment = team.scenario.deployment
+    friction, gravity = deployment.joint_friction, downhill(deployment.floor.slope)
     if team.plant.num_force_elements() > 1:  # every plant has gravity
-        allowed = "null: blocked wheels are simulated for models without springs alone"
-        raise ScenarioError(str(team.scenario.path), "deployment.robots", "blocked", allowed)
+        key, value = ("joint_friction", friction) if friction != JointFriction() else ("robots", "blocked")
+        allowed = "none: blocked wheels and friction of joints are simulated for models without springs alone"
+        raise ScenarioError(str(team.scenario.path), f"deployment.{key}", value, allowed)
     whole = read_team_tree(team, read_component_tree(team))
-    gravity = downhill(team.scenario.deployment.floor.slope)
-    block = BlockedBases(whole, team.velocity_index[3:], times, gravity, wrenches.size())
-    builder.AddNamedSystem("blocked_bases", block)
+    levels, size = (friction.coulomb, friction.viscous), wrenches.size()
+    block = Sticking(whole, team.velocity_index[3:], times, levels, gravity, size)
+    builder.AddNamedSystem("sticking", block)
+    parts = builder.AddNamedSystem("sticking_parts", Demultiplexer([size, team.plant.num_velocities()]))
     builder.Connect(team.plant.get_state_output_port(), block.GetInputPort("team_state"))
     if team.joints:
         builder.Connect(torques, block.GetInputPort("joint_torques"))
     builder.Connect(wrenches, block.GetInputPort("asked"))
-    return block.get_output_port()
+    builder.Connect(block.get_output_port(), parts.get_input_port())
+    builder.Connect(parts.get_output_port(1), team.plant.get_applied_generalized_force_input_port())
+    return parts.get_output_port(0)
 
 
 def _sum(builder: DiagramBuilder, name: str, first: OutputPort, second: OutputPort) -> OutputPort:

@@ -50,6 +50,7 @@ def run_setup(scenario: Scenario) -> RunSetup:
         grasps=np.array([[robot.X_LE.x, robot.X_LE.y] for robot in team.robots]),
         bodies=tuple(team_masses(team, read_component_tree(team))),
         joint_damping=np.array([joint.GetDampingVector(context)[0] for joint in team.joints]),
+        joint_friction=(deployment.joint_friction.coulomb, deployment.joint_friction.viscous),
         joint_inertia=joint_inertias(team),
         displacement=displacement(deployment, 3 + len(team.joints)),
     )

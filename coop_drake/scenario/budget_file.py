@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from coop_drake.answers.budget import LIMITS, Budget
 from coop_drake.errors import ScenarioError
-from coop_drake.scenario.deployment import Floor, RobotDepartures
+from coop_drake.scenario.deployment import Floor, JointFriction, RobotDepartures
 from coop_drake.scenario.measured_bounds import grasp_bounds, rate_levers, wave_bounds
 from coop_drake.scenario.model import Scenario
 from coop_drake.scenario.reading import read_file
@@ -160,6 +160,7 @@ def _refuse_uncounted(scenario: Scenario, *, axes: bool) -> None:
             name: own for name, own in deployment.robots.items() if own.counted != RobotDepartures()
         },
         "deployment.floor": None if deployment.floor == Floor() else deployment.floor,
+        "deployment.joint_friction": own if (own := deployment.joint_friction) != JointFriction() else None,
         "deployment.pushes": deployment.pushes,
     }
     for key, value in uncounted.items():

@@ -227,6 +227,20 @@ class Floor:
 
 
 @dataclass(frozen=True)
+class JointFriction:
+    """Friction of every joint, beside the damping that its model has.
+
+    Attributes:
+        coulomb: Coulomb friction: against the motion, whatever its rate; a joint at rest is held by up to as
+            much [N m, or N for a joint that slides].
+        viscous: Friction against the motion for each unit of the rate [N m s or N s/m].
+    """
+
+    coulomb: NotNegative = 0.0
+    viscous: NotNegative = 0.0
+
+
+@dataclass(frozen=True)
 class Push:
     """A constant force from outside on one body for a while.
 
@@ -279,6 +293,7 @@ class Deployment:
         messages: Losses and delay of ready reports; needs a control rate.
         robots: What is wrong with single robots, by name; ``"*"`` for all that have no entry of their own.
         floor: Friction and slope of the floor.
+        joint_friction: Friction of every joint, which no robot knows of.
         pushes: Forces from outside.
         start_offset: How far the team stands away from the plan's start.
         budget: Under which budget of these departures a plan must hold: ``none``, ``position`` for
@@ -294,6 +309,7 @@ class Deployment:
     messages: Messages = field(default_factory=Messages)
     robots: dict[str, RobotDepartures] = field(default_factory=dict)
     floor: Floor = field(default_factory=Floor)
+    joint_friction: JointFriction = field(default_factory=JointFriction)
     pushes: tuple[Push, ...] = ()
     start_offset: StartOffset = field(default_factory=StartOffset)
     budget: Literal["none", "position", "all"] = "none"

@@ -4,6 +4,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import fields
 
 from coop_drake.errors import ScenarioError
+from coop_drake.scenario.deployment import JointFriction
 from coop_drake.scenario.limits import ALL_ROBOTS
 from coop_drake.scenario.model import Scenario
 
@@ -59,6 +60,9 @@ def _sizes(scenario: Scenario) -> Iterator[tuple[str, object, str]]:
         if departures.blocked is not None and not scenario.plant.ideal:
             allowed = "null with plant.grasps: constraints: blocked wheels are simulated in one tree alone"
             yield f"robots.{robot}.blocked", departures.blocked, allowed
+    if deployment.joint_friction != JointFriction() and not scenario.plant.ideal:
+        allowed = "none with plant.grasps: constraints: friction that sticks is simulated in one tree alone"
+        yield "joint_friction", deployment.joint_friction, allowed
     for i, push in enumerate(deployment.pushes):
         if push.duration < step:
             allowed = f"at least simulator.max_step_size, {step:g} s: a step might miss a shorter one"

@@ -4,7 +4,6 @@ from coop_drake.systems.arrival_monitor import ArrivalMonitor
 from coop_drake.systems.axis_laws import AxisLaw, axis_laws
 from coop_drake.systems.axis_ppc import AxisPpc
 from coop_drake.systems.block import Block
-from coop_drake.systems.blocked_bases import BlockedBases
 from coop_drake.systems.cell_planner import CellPlanner
 from coop_drake.systems.current_cell import CURRENT_CELL_SIZE, READY_SIZE
 from coop_drake.systems.departure_monitor import DepartureMonitor, MonitoredRobot
@@ -29,6 +28,7 @@ from coop_drake.systems.robot_effort import RobotEffort
 from coop_drake.systems.selector import build_selector
 from coop_drake.systems.sensors import TeamSensor, build_separate_sensor
 from coop_drake.systems.state_predictor import StatePredictor
+from coop_drake.systems.sticking import Sticking
 from coop_drake.systems.team_controller import TeamController
 from coop_drake.systems.team_kernels import FusedCell, FusedTeam
 from coop_drake.systems.team_link import Exchange, TeamLink, robot_record, supervisor_record
@@ -45,7 +45,6 @@ __all__ = [
     "AxisMotion",
     "AxisPpc",
     "Block",
-    "BlockedBases",
     "CellPlanner",
     "DepartureMonitor",
     "DisturbanceObserver",
@@ -73,6 +72,7 @@ __all__ = [
     "ReferenceGovernor",
     "RobotEffort",
     "StatePredictor",
+    "Sticking",
     "TeamController",
     "TeamLink",
     "TeamSensor",

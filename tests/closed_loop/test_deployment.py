@@ -14,6 +14,7 @@ from coop_drake.scenario import (
     BlockedWheels,
     Deployment,
     Floor,
+    JointFriction,
     Measurements,
     Messages,
     PoseBias,
@@ -72,6 +73,7 @@ MILD = {
     "blocked wheels": in_one(blocked=BlockedWheels(0.5, 0.02)),
     "wheels that slip": in_one(slip=WheelSlip(0.5, 0.5, 0.2)),
     "friction": at_200_hz(floor=Floor(coulomb_friction=20.0, viscous_friction=5.0)),
+    "friction of joints": at_200_hz(joint_friction=JointFriction(coulomb=0.3, viscous=0.2)),
     "slope": at_200_hz(floor=Floor(slope=0.01)),
     "push": pushed(20.0),
     "start": at_200_hz(start_offset=StartOffset(0.005, -0.005, 0.005, (0.005, -0.005))),
@@ -125,6 +127,10 @@ HARSH = {
     "friction": (
         at_200_hz(floor=Floor(coulomb_friction=50.0)),
         "waits until the object reaches its goal position",
+    ),
+    "friction of joints": (
+        at_200_hz(joint_friction=JointFriction(coulomb=20.0)),
+        "waits until the energy of",
     ),
     "slope": (at_200_hz(floor=Floor(slope=0.1)), "waits until the object reaches its goal position"),
     "push": (pushed(300.0), "to its funnel is"),

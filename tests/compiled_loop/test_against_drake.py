@@ -16,6 +16,7 @@ from coop_drake.scenario import (
     Deployment,
     Floor,
     Hold,
+    JointFriction,
     Measurements,
     Messages,
     PlantSettings,
@@ -69,6 +70,8 @@ CASES = {
     "wheels that slip": of_one(slip=WheelSlip(0.5, 0.5, 0.2)),
     "held motors": of_one(silence=Silence(0.5, 0.02, motors="held")),
     "floor": at_200_hz(floor=Floor(coulomb_friction=5.0, viscous_friction=5.0, slope=0.01)),
+    "dry friction of joints": at_200_hz(joint_friction=JointFriction(coulomb=0.3)),
+    "friction of joints": at_200_hz(joint_friction=JointFriction(coulomb=0.2, viscous=0.3)),
     "start": at_200_hz(start_offset=StartOffset(2e-3, -1e-3, 1e-3, (1e-3, -5e-4))),
     "push": at_200_hz(pushes=(Push("robot_1", (15.0, 5.0), 0.5, 0.5, torque=1.0),)),
 }

@@ -14,6 +14,7 @@ from coop_drake.scenario import (
     BlockedWheels,
     Deployment,
     Floor,
+    JointFriction,
     Measurements,
     Messages,
     PoseBias,
@@ -44,6 +45,7 @@ EVERYTHING = Deployment(
                                    blocked=BlockedWheels(0.45, 0.02)),
     },
     floor=Floor(coulomb_friction=2.0, viscous_friction=2.0, slope=0.01),
+    joint_friction=JointFriction(coulomb=0.2, viscous=0.1),
     pushes=(Push("robot_1", (15.0, 5.0), 0.2, 0.2, torque=1.0),),
     seed=3,
 )  # fmt: skip

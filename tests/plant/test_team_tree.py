@@ -6,8 +6,8 @@ from pydrake.multibody.math import SpatialForce
 from pydrake.multibody.plant import ExternallyAppliedSpatialForce
 from pydrake.systems.framework import DiagramBuilder
 
-from coop_drake.laws.blocked_wheels import BRAKING_TIME, blocked_room, hold_blocked
 from coop_drake.laws.chain_motion import DAMPING
+from coop_drake.laws.sticking import BRAKING_TIME, STICKING_TIME, stick, sticking_room
 from coop_drake.laws.team_dynamics import solve_tree, team_accelerations, team_work
 from coop_drake.plant import build_team_plant, read_component_tree, read_team_tree
 from tests.support.ring_team import PRISMATIC, REVOLUTE, ring_team
@@ -55,31 +55,37 @@ def test_the_team_accelerates_as_in_drake(tmp_path):
         np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-9)
 
 
-@pytest.mark.parametrize("blocked", [[0], [1, 2], [0, 1, 2, 3]])
-def test_bases_with_blocked_wheels_are_braked_in_drake_whatever_else_acts(tmp_path, blocked):
-    """Also where so many are blocked that the floor's wrenches are not unique."""
+@pytest.mark.parametrize("friction", [(0.0, 0.0), (2.0, 0.3), (20.0, 0.0)])
+@pytest.mark.parametrize("blocked", [[], [0], [1, 2], [0, 1, 2, 3]])
+def test_what_sticks_in_drake_sticks_whatever_else_acts(tmp_path, blocked, friction):
+    """Bases with blocked wheels are braked, joints as far as their friction suffices.
+
+    Also where so many bases are blocked that the floor's wrenches are not unique.
+    """
     builder, generator = DiagramBuilder(), np.random.default_rng(2)
     team = build_team_plant(ring_team(tmp_path, ARMS), builder)
     plant, diagram = team.plant, builder.Build()
     tree = read_team_tree(team, read_component_tree(team))
     context = plant.GetMyMutableContextFromRoot(diagram.CreateDefaultContext())
-    size, work, room = plant.num_velocities(), team_work(tree.tree), blocked_room(len(tree.tree), len(ARMS))
-    flags = np.zeros(len(ARMS))
+    size, work, room = plant.num_velocities(), team_work(tree.tree), sticking_room(len(tree.tree), len(ARMS))
+    flags, joints = np.zeros(len(ARMS)), team.velocity_index[3:]
+    loose = [len(blocked) < 2 or k not in blocked for k, arm in enumerate(ARMS) for _ in arm]
+    kinds = set()
     flags[blocked] = 1.0
-    for _ in range(10):
-        state, wrenches = generator.normal(size=2 * size), 100.0 * generator.normal(size=(len(ARMS) + 1, 3))
+    for draw in range(10):
+        state, wrenches = generator.normal(size=2 * size), 30.0 * generator.normal(size=(len(ARMS) + 1, 3))
         state[team.position_index[3:]] *= 0.1
         # Where all are blocked, no motion of the team brakes all of them alike while it turns.
-        state[size:] *= 0.0 if len(blocked) == len(ARMS) else 1.0
-        torques, efforts = generator.normal(size=len(team.joints)), np.zeros(size)
-        efforts[team.velocity_index[3:]] = torques
+        state[size:] *= 0.0 if len(blocked) == len(ARMS) or draw % 2 else 1.0
+        torques, efforts = 3.0 * generator.normal(size=len(team.joints)), np.zeros(size)
+        efforts[joints] = torques
         found, asked = np.empty(size), wrenches.copy()
-        forces = tree.bases, tree.places, flags, efforts, 0.0
-        hold_blocked(tree.tree, *forces, state, work, room, found, wrenches)
+        forces = tree.bases, tree.places, flags, np.array(friction), efforts, 0.0
+        stick(tree.tree, *forces, state, work, room, found, wrenches)
         free = [k for k in range(len(ARMS) + 1) if k not in blocked]
         np.testing.assert_array_equal(wrenches[free], asked[free])
         plant.SetPositionsAndVelocities(context, state)
-        plant.get_actuation_input_port().FixValue(context, torques)
+        plant.get_actuation_input_port().FixValue(context, efforts[joints])
         plant.get_applied_spatial_force_input_port().FixValue(context, applied(team, wrenches))
         accelerated = plant.get_generalized_acceleration_output_port().Eval(context)
         np.testing.assert_allclose(found, accelerated, rtol=1e-9, atol=1e-7)
@@ -89,6 +95,16 @@ def test_bases_with_blocked_wheels_are_braked_in_drake_whatever_else_acts(tmp_pa
             expected = -np.array([*moving.translational()[:2], moving.rotational()[2]]) / BRAKING_TIME
             seen = [*braked.translational()[:2], braked.rotational()[2]]
             np.testing.assert_allclose(seen, expected, rtol=1e-6, atol=1e-6)
+        rates = state[size + joints]
+        dry = efforts[joints] - torques + friction[1] * rates
+        assert (np.abs(dry) <= (1.0 + 1e-8) * friction[0] + 1e-12).all()
+        beyond = accelerated[joints] + rates / STICKING_TIME
+        for force, rate, fast in zip(dry[loose], rates[loose], beyond[loose], strict=True):
+            kind = "sticks" if abs(fast) < 1e-6 else "slides"
+            if kind == "slides":
+                assert force == pytest.approx(-np.sign(fast) * friction[0])
+            kinds.add((kind, rate == 0.0))
+    assert len(kinds) == (4 if friction[0] else 2) * any(loose), kinds
 
 
 @pytest.mark.parametrize("parents", [[-1], [-1, 0], [-1, 0, 1, 2, 3, 2, 5], [-1, 0, 0, 1, 1, 3]])

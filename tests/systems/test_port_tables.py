@@ -17,6 +17,7 @@ from coop_drake.scenario import (
     Deployment,
     Floor,
     Hold,
+    JointFriction,
     Measurements,
     Messages,
     PlantSettings,
@@ -42,6 +43,7 @@ EVERYTHING = Deployment(
     messages=Messages(loss=0.1),
     robots={"*": RobotDepartures(silence=Silence(1.0), blocked=BlockedWheels(1.0), slip=WheelSlip(1.0, 0.5))},
     floor=Floor(coulomb_friction=1.0),
+    joint_friction=JointFriction(coulomb=0.1),
     actuators=ActuatorLimits(lag=0.01),
 )
 

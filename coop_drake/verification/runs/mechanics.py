@@ -2,7 +2,8 @@
 
 About the object's origin, the sum of m a and of I w' + r x m a over all bodies of a robot is the wrench of
 its base less that at its grasp. Of the bodies that a joint carries outwards, the same sum less the base's
-wrench, taken along the joint, is the joint's effort but for its damping and its rotor's inertia.
+wrench, taken along the joint, is the joint's effort but for its damping, its rotor's inertia, and a dry
+friction up to the scenario's.
 """
 
 from __future__ import annotations
@@ -61,18 +62,21 @@ def _check_joint(rows: Rows, tree: ComponentTree, setup: RunSetup, joint: TreeJo
         axis = turned(np.tile(joint.axis, (len(rows.z), 1)), turns(stages, rows.z))
         along = np.einsum("ij,ij->i", axis, force[:, :2])
     rate, acceleration = log.joint_rates[:, j], log.accelerations[:, 3 + j]
-    own = setup.joint_damping[j] * rate + setup.joint_inertia[j] * acceleration
+    coulomb, viscous = setup.joint_friction
+    own = (setup.joint_damping[j] + viscous) * rate + setup.joint_inertia[j] * acceleration
     needed = np.zeros(log.joint_torques.shape)
     needed[:, j] = along + own
     found = np.where(np.arange(len(tree.joints)) == j, log.joint_torques, 0.0)
-    _require(rows, "joint_torques", found, (needed, size + np.abs(own)))
+    _require(rows, "joint_torques", found, (needed, size + np.abs(own)), coulomb)
 
 
-def _require(rows: Rows, name: str, found: FloatArray, needed: tuple[FloatArray, FloatArray]) -> None:
-    """Refuse forces (T, m) that are not those needed, whose terms have sizes (T,)."""
+def _require(
+    rows: Rows, name: str, found: FloatArray, needed: tuple[FloatArray, FloatArray], friction: float = 0.0
+) -> None:
+    """Refuse forces (T, m) that are not those needed, whose terms have sizes (T,), up to a friction."""
     forces, size = needed
     text = "give {:.9g} N or N m; the motion needs {:.9g}"
-    allowed = SAME * (1.0 + size[:, None] + np.abs(found).sum(axis=1, keepdims=True))
+    allowed = friction + SAME * (1.0 + size[:, None] + np.abs(found).sum(axis=1, keepdims=True))
     rows.require(np.abs(found - forces) <= allowed, name, text, found, forces)
 
 

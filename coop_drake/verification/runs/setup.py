@@ -35,8 +35,8 @@ class RunSetup:
         robot_names: Names of the robots.
         exact: Whether the team is ideal, so that the equations of the control law hold to rounding.
         rigid: Whether grasps are exactly rigid.
-        mechanics: Whether grasps are rigid and nothing but actuators, joint damping and grasps acts on the
-            bodies, so that the equations of motion hold to rounding.
+        mechanics: Whether grasps are rigid and nothing but actuators, damping and friction of joints, and
+            grasps acts on the bodies, so that the equations of motion hold to rounding.
         can_be_held: Whether the scenario knows holds.
         one_hold: Whether all robots hear at once that they are held, and not.
         one_clock: Whether all robots have the same time since a cell was entered, but for holds.
@@ -44,6 +44,8 @@ class RunSetup:
         grasps: Every robot's grasp in L, shape (N, 2) [m].
         bodies: Mass properties of all bodies.
         joint_damping: Of every joint, shape (n,) [N m s or N s/m].
+        joint_friction: Largest dry friction of a joint [N m or N], and its friction for each unit of the rate
+            besides [N m s or N s/m].
         joint_inertia: That the joint's rotor adds, shape (n,) [kg m^2 or kg].
         displacement: How far the team stands off the plan's start, shape (3 + n,) [m, rad].
     """
@@ -60,5 +62,6 @@ class RunSetup:
     grasps: FloatArray
     bodies: tuple[BodyMass, ...]
     joint_damping: FloatArray
+    joint_friction: tuple[float, float]
     joint_inertia: FloatArray
     displacement: FloatArray

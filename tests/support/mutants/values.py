@@ -77,6 +77,8 @@ _NOT_NEGATIVE = [
     "deployment.measurements.waves.angle.size",
     "deployment.floor.coulomb_friction",
     "deployment.floor.viscous_friction",
+    "deployment.joint_friction.coulomb",
+    "deployment.joint_friction.viscous",
 ]
 _BEYOND = {
     "planner.slice_overlap": (1.5, "slices overlap by a part of their width"),
