@@ -22,7 +22,7 @@ from coop_drake.answers.search_report import SearchReport
 from coop_drake.errors import GeometryError, PatienceError, PlanError, StallError, TooQuickError
 from coop_drake.laws import GainSet, ScheduledGains
 from coop_drake.planning.boxes.channel import Channel, CoveredPath, NoChannel, ended
-from coop_drake.planning.cells.ends import SAME_END
+from coop_drake.planning.questions.endings import SAME_END
 from coop_drake.planning.execution.estimate import plan_time
 from coop_drake.planning.execution.refusals import refusals, without_limits
 from coop_drake.planning.improvement.further_paths import quicker_plans

@@ -16,7 +16,8 @@ from coop_drake.geometry.swept_tree import Intervals, SweptTree
 from coop_drake.planning.boxes.certify import PathBox
 from coop_drake.planning.boxes.channel import Channel, FreeBox
 from coop_drake.planning.cells.cells import CellMaker, Region, regions_of
-from coop_drake.planning.cells.ends import end_in, ending_at
+from coop_drake.planning.cells.ends import end_in
+from coop_drake.planning.questions.endings import ending_at
 from coop_drake.planning.questions.floor_near import nearby
 from coop_drake.planning.questions.margins import disc_polygon, is_patched, marginal_workspace
 from coop_drake.tree.circles import nearest_turn, turns_to

@@ -14,7 +14,7 @@ from coop_drake.answers.problem import PlanningProblem
 from coop_drake.answers.proof import InfeasibilityProof
 from coop_drake.geometry.parts import parts_of
 from coop_drake.geometry.passage import pole
-from coop_drake.planning.cells.ends import ending_at
+from coop_drake.planning.questions.endings import ending_at
 from coop_drake.tree.pose import FloatArray
 
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from coop_drake.answers.problem import PlanningProblem, at_goal, goal_box
 from coop_drake.errors import GeometryError
-from coop_drake.planning.cells.ends import ending_at, within_limits
+from coop_drake.planning.questions.endings import ending_at, within_limits
 from coop_drake.planning.questions.margins import shrunk
 from coop_drake.planning.sampling.collision_kernels import is_free
 from coop_drake.planning.sampling.obstacle_grid import ObstacleGrid, grid_for_team

@@ -22,7 +22,7 @@ from coop_drake.answers.search_report import SearchReport
 from coop_drake.errors import GeometryError, PatienceError
 from coop_drake.planning.boxes.boxes import explored_channel
 from coop_drake.planning.boxes.channel import Channel, CoveredPath, NoChannel, middle_of
-from coop_drake.planning.cells.ends import within_limits
+from coop_drake.planning.questions.endings import within_limits
 from coop_drake.planning.cells.events import Watch
 from coop_drake.planning.cells.exploration import Verdict
 from coop_drake.planning.proofs.blocked_goals import blocked_goal, touch_at_goal
