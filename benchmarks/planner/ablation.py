@@ -18,9 +18,9 @@ from benchmarks.rows import Row
 from benchmarks.tasks import Task
 from coop_drake.answers import PlanningProblem
 from coop_drake.planning import find_channel
-from coop_drake.planning.boxes.channel import Channel
 from coop_drake.planning.cells.exploration import Exploration, Verdict
-from coop_drake.planning.proofs.proof_search import Proofs
+from coop_drake.planning.channel import Channel
+from coop_drake.planning.proofs import Proofs
 
 __all__ = ["VARIANTS", "Answered", "ablation_rows", "ablation_tasks", "answer"]
 

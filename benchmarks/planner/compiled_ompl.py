@@ -10,8 +10,7 @@ import numpy as np
 from coop_drake.answers import PlanningProblem
 from coop_drake.campaign.questions.ompl_peer import run_ompl
 from coop_drake.campaign.questions.peer import PeerRun
-from coop_drake.planning.sampling.collision_kernels import is_free
-from coop_drake.planning.sampling.obstacle_grid import grid_for_team
+from coop_drake.planning.sampling.collision import grid_for_team, is_free
 from coop_drake.tree.team_arrays import team_arrays
 
 __all__ = ["run_compiled_ompl"]

@@ -19,10 +19,9 @@ from benchmarks.planner.ours import Planned, plan_repeatedly
 from benchmarks.rows import Row
 from benchmarks.tasks import Task
 from coop_drake.answers import PlanningProblem
-from coop_drake.planning.improvement import path_covering, quickest
-from coop_drake.planning.sampling import clear_paths
-from coop_drake.planning.sampling.elastic_band import smoothed
-from coop_drake.planning.search import sampled_search
+from coop_drake.planning import cell_selection, sampled_search
+from coop_drake.planning.sampling import band
+from coop_drake.planning.sampling.band import smoothed
 
 __all__ = ["CASES", "STAGES", "Replacement", "stage_rows", "stage_tasks", "without_stage"]
 
@@ -53,8 +52,8 @@ class Replacement:
 
 def _known_path(problem: PlanningProblem, hierarchy: object, known: Any, gap: float, share: float) -> Any:
     """Smooth the known path only, as it is smoothed before candidates are compared."""
-    moves = clear_paths.COMPARED_MOVES
-    return smoothed(problem, known, clear_paths.LEAST_CLEARANCE, 0.0, gap, moves=moves)
+    moves = band.COMPARED_MOVES
+    return smoothed(problem, known, band.LEAST_CLEARANCE, 0.0, gap, moves=moves)
 
 
 def _same_path(problem: PlanningProblem, path: Any, gap: float) -> Any:
@@ -65,14 +64,14 @@ def _same_path(problem: PlanningProblem, path: Any, gap: float) -> Any:
 STAGES: dict[str, tuple[Replacement, ...]] = {
     "everything": (),
     "no_candidates": (Replacement(sampled_search, "best_candidate", _known_path),),
-    "no_widening": (Replacement(clear_paths, "WIDE_MOVES", 0),),
-    "no_straightening": (Replacement(clear_paths, "STRAIGHTENINGS", ()),),
-    "no_centring": (Replacement(clear_paths, "NARROW_REPEATS", 0),),
+    "no_widening": (Replacement(band, "WIDE_MOVES", 0),),
+    "no_straightening": (Replacement(band, "STRAIGHTENINGS", ()),),
+    "no_centring": (Replacement(band, "NARROW_REPEATS", 0),),
     "no_improved_path": (
         Replacement(sampled_search, "moved_from_obstacles", lambda problem, path, gap, share: path),
     ),
-    "no_covering": (Replacement(quickest, "cover_path", lambda *asked: None),),
-    "no_narrow_boxes": (Replacement(path_covering, "LEVELS", path_covering.LEVELS[:1]),),
+    "no_covering": (Replacement(cell_selection, "cover_path", lambda *asked: None),),
+    "no_narrow_boxes": (Replacement(cell_selection, "LEVELS", cell_selection.LEVELS[:1]),),
 }
 """For every variant what is replaced; the name says which stage is missing."""
 

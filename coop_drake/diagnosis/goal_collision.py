@@ -14,7 +14,7 @@ from coop_drake.diagnosis.contacts import Contact, Overlap, contacts, overlaps
 from coop_drake.diagnosis.findings import BlockedPose
 from coop_drake.diagnosis.variants import Answer, BudgetedPlanner, Outcome
 from coop_drake.diagnosis.widened_floor import WidenedFloor
-from coop_drake.planning.proofs.blocked_goals import blocked_goal
+from coop_drake.planning.blocked_goal import blocked_goal
 from coop_drake.tree.pose import FloatArray
 
 TRIED = 256

@@ -13,7 +13,7 @@ from coop_drake.answers import PlanningProblem
 from coop_drake.diagnosis.contacts import Contact, contacts
 from coop_drake.diagnosis.gap import Gap, narrowest_gap
 from coop_drake.geometry.swept_tree import Interval
-from coop_drake.planning.questions.margins import exact_footprint
+from coop_drake.planning.questions import exact_footprint
 from coop_drake.tree.pose import FloatArray
 
 NOTICED = 0.05

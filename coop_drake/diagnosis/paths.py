@@ -11,10 +11,10 @@ from coop_drake.geometry.parts import parts_of
 from coop_drake.geometry.passage import pole
 from coop_drake.geometry.swept_tree import SweptTree
 from coop_drake.planning import Channel
-from coop_drake.planning.boxes.certify import Certifier
-from coop_drake.planning.boxes.channel import ended
-from coop_drake.planning.execution.channel_path import path_through
-from coop_drake.planning.questions.margins import exact_footprint, marginal_workspace
+from coop_drake.planning.boxes import Certifier
+from coop_drake.planning.channel import ended
+from coop_drake.planning.questions import exact_footprint, marginal_workspace
+from coop_drake.planning.transitions import path_through
 from coop_drake.tree.levers import configuration_scale
 from coop_drake.tree.pose import FloatArray
 

@@ -8,11 +8,11 @@ from enum import Enum
 from coop_drake.answers import PlanningProblem
 from coop_drake.diagnosis.paths import is_free, widest_path
 from coop_drake.errors import GeometryError, PlanError
-from coop_drake.planning.boxes.boxes import explored_channel
 from coop_drake.planning.cells.exploration import Verdict
-from coop_drake.planning.proofs.proof_search import Proofs
-from coop_drake.planning.sampling.densify import densified
-from coop_drake.planning.search.sampled_search import SampledSearch
+from coop_drake.planning.channel import explored_channel
+from coop_drake.planning.proofs import Proofs
+from coop_drake.planning.sampled_search import SampledSearch
+from coop_drake.planning.sampling.collision import densified
 from coop_drake.progress import Progress
 from coop_drake.tree.levers import configuration_scale
 from coop_drake.tree.pose import FloatArray

@@ -1,7 +1,7 @@
-from .boxes.channel import Channel, FreeBox, NoChannel
-from .execution.estimate import plan_time
-from .execution.transitions import make_plan, reschedule
-from .search.search import find_channel
+from .channel import Channel, FreeBox, NoChannel
+from .duration import plan_time
+from .search import find_channel
+from .transitions import make_plan, reschedule
 
 __all__ = [
     "Channel",

@@ -1,29 +1,166 @@
-"""Compiled boxes along a path: the longest whose swept footprint stays clear of obstacles and of itself.
-
-What these kernels call free is proved: they use the over-sweeps of eq. (6), a floor shrunk by more than
-rounding errors, and the fact that a footprint at a distance c from all obstacles may move by less than c in
-any direction.
-"""
+"""Boxes of configurations that are proved free by over-sweeps, laid along a candidate path."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from math import hypot
+from typing import NamedTuple
 
 import numpy as np
+from shapely import MultiPolygon, Polygon
 
 from coop_drake.compiled import compiled
-from coop_drake.planning.boxes.box_sweeps import (
-    BoxArrays,
-    bodies_apart,
-    enclosing_disc,
-    room_for_sweeps,
-    swept_piece,
-    with_ring,
-)
-from coop_drake.planning.sampling.collision_kernels import ring_clearance
-from coop_drake.planning.sampling.obstacle_grid import ObstacleGrid
-from coop_drake.planning.travel_time import SETTLING_TIME, SPEED_PER_CLEARANCE
-from coop_drake.tree.pose import FloatArray
+from coop_drake.geometry.body_pairs import TOUCH, BodyPairs
+from coop_drake.geometry.distances import separated
+from coop_drake.geometry.piece_sweeps import joint_width, over_joint, rounded_sweep
+from coop_drake.geometry.swept_tree import Intervals, SweptTree
+from coop_drake.planning.duration import SETTLING_TIME, SPEED_PER_CLEARANCE
+from coop_drake.planning.sampling.collision import ObstacleGrid, densified, grid_inside, ring_clearance
+from coop_drake.tree.pose import FloatArray, IntArray
+from coop_drake.tree.team_arrays import TeamArrays
+
+# Compiled over-sweeps of a whole team through a box, and whether its bodies touch anywhere in it.
+
+
+class BoxArrays(NamedTuple):
+    """The team and the joint limits as arrays, used to test whether a box is free.
+
+    Attributes:
+        team: The team.
+        pair_sweeps: The sweeps that collision pairs need, each once: a piece and its number of stages, in the
+            order in which a box sweeps them: the last piece first, fewer stages first, shape (S, 2).
+        pairs: Pairs of rows of ``pair_sweeps`` that must not touch, shape (K, 2).
+        lower: Lower limits of (theta, q...), minus infinity for theta, shape (1 + n,).
+        upper: Upper limits, shape (1 + n,).
+    """
+
+    team: TeamArrays
+    pair_sweeps: IntArray
+    pairs: IntArray
+    lower: FloatArray
+    upper: FloatArray
+
+
+@compiled
+def enclosing_disc(ring: FloatArray, disc: FloatArray) -> None:
+    """Write a disc (x, y, radius) that holds a ring, shape (n, 2) [m], into ``disc``, shape (3,) [m]."""
+    disc[0], disc[1], disc[2] = 0.0, 0.0, 0.0
+    for i in range(len(ring)):
+        disc[0] += ring[i, 0] / len(ring)
+        disc[1] += ring[i, 1] / len(ring)
+    for i in range(len(ring)):
+        disc[2] = max(disc[2], hypot(ring[i, 0] - disc[0], ring[i, 1] - disc[1]))
+
+
+@compiled
+def with_ring(vertices: FloatArray, size: int, ring: FloatArray) -> FloatArray:
+    """Write a ring into the rows from ``size`` on; returns a longer copy where there are too few, (V, 2)."""
+    if size + len(ring) > len(vertices):
+        longer = np.empty((2 * (size + len(ring)), 2))
+        for k in range(size):
+            longer[k, 0], longer[k, 1] = vertices[k, 0], vertices[k, 1]
+        vertices = longer
+    for k in range(len(ring)):
+        vertices[size + k, 0], vertices[size + k, 1] = ring[k, 0], ring[k, 1]
+    return vertices
+
+
+class PairSweeps(NamedTuple):
+    """Memory for the sweeps that collision pairs need, those of ``BoxArrays.pair_sweeps``.
+
+    Attributes:
+        first: First vertex of each and the vertex after the last one, shape (S + 1,).
+        widths: Width of the widest interval that each was swept through, shape (S,) [rad or m].
+    """
+
+    first: IntArray
+    widths: FloatArray
+
+
+@compiled
+def room_for_sweeps(count: int) -> PairSweeps:
+    """Memory for some sweeps."""
+    return PairSweeps(np.zeros(count + 1, np.int64), np.zeros(count))
+
+
+@compiled
+def swept_piece(
+    boxes: BoxArrays,
+    piece: int,
+    lower: FloatArray,
+    upper: FloatArray,
+    sweeps: PairSweeps,
+    vertices: FloatArray,
+    row: int,
+) -> tuple[FloatArray, FloatArray, int]:
+    """Sweep a piece through a box, eq. (6), and keep what collision pairs need of it on the way.
+
+    The sweep over a piece's first joints is an intermediate result of the sweep over all of them.
+
+    Args:
+        boxes: The team.
+        piece: Index of the piece.
+        lower: Lower ends of (theta, q...), shape (1 + n,) [rad, m].
+        upper: Upper ends, shape (1 + n,).
+        sweeps: Memory; its entries for the piece are written.
+        vertices: Sweeps of the rows before, not grown by radii, shape (V, 2) [m].
+        row: First row of ``pair_sweeps`` that is of this piece or of one that follows.
+
+    Returns:
+        The sweep over all joints with the piece's radius, shape (n, 2) [m]; ``vertices`` with the piece's
+        sweeps, a longer copy where there were too few rows; the first row of a following piece.
+    """
+    team = boxes.team
+    ring = team.vertices[team.pieces[piece, 1] : team.pieces[piece, 2]].copy()
+    link, stages, widest = team.pieces[piece, 0], 0, 0.0
+    while True:
+        needed = row < len(boxes.pair_sweeps) and boxes.pair_sweeps[row, 0] == piece
+        if needed and boxes.pair_sweeps[row, 1] == stages:
+            vertices = with_ring(vertices, sweeps.first[row], ring)
+            sweeps.first[row + 1] = sweeps.first[row] + len(ring)
+            sweeps.widths[row] = widest
+            row += 1
+        if link < 0:
+            return rounded_sweep(team, piece, ring, widest), vertices, row
+        widest = max(widest, joint_width(team, link, lower, upper))
+        ring = over_joint(team, link, ring, lower, upper)
+        link, stages = team.links[link, 0], stages + 1
+
+
+@compiled
+def bodies_apart(boxes: BoxArrays, sweeps: PairSweeps, swept: FloatArray) -> bool:
+    """Whether no two bodies touch anywhere in a box: their over-sweeps are separated.
+
+    Args:
+        boxes: The team.
+        sweeps: Where the sweeps are.
+        swept: The sweeps, see ``swept_piece``, shape (V, 2) [m].
+    """
+    count = len(boxes.pair_sweeps)
+    vertices, first = np.empty((32 * count, 2)), np.zeros(count + 1, np.int64)
+    discs = np.empty((count, 3))
+    for k in range(count):
+        ring = swept[sweeps.first[k] : sweeps.first[k + 1]]
+        ring = rounded_sweep(boxes.team, boxes.pair_sweeps[k, 0], ring, sweeps.widths[k])
+        enclosing_disc(ring, discs[k])
+        vertices = with_ring(vertices, first[k], ring)
+        first[k + 1] = first[k] + len(ring)
+    for k in range(len(boxes.pairs)):
+        i, j = boxes.pairs[k, 0], boxes.pairs[k, 1]
+        far = hypot(discs[i, 0] - discs[j, 0], discs[i, 1] - discs[j, 1])
+        if far <= discs[i, 2] + discs[j, 2] + 2.0 * TOUCH and not separated(
+            vertices[first[i] : first[i + 1]], vertices[first[j] : first[j + 1]], TOUCH
+        ):
+            return False
+    return True
+
+
+# Compiled boxes along a path: the longest whose swept footprint stays clear of obstacles and of itself.
+#
+# What these kernels call free is proved: they use the over-sweeps of eq. (6), a floor shrunk by more than
+# rounding errors, and the fact that a footprint at a distance c from all obstacles may move by less than c
+# in any direction.
 
 COARSENESS = 0.2
 """A box may fall short of the longest one by this fraction of its samples [-]: fewer boxes are tried."""
@@ -230,3 +367,163 @@ def longest_box(
         if pace > fastest:
             quickest, fastest = j, pace
     return quickest, best, trials
+
+
+# Cover a path with boxes that are proved free by over-sweeps; consecutive boxes overlap.
+
+LEVELS = ((0.06, 0.02), (0.03, 0.01), (0.015, 0.004), (0.004, 0.001), (0.001, 0.0003))
+"""Padding of a box in every angle and joint [rad or m], and clearance that it needs at both ends [m]; the
+widest comes first, because wide boxes are crossed faster."""
+
+FIRST_LEVELS = LEVELS[2:]
+"""The levels with which the longest boxes are laid: without wide paddings each holds more of the path."""
+
+SMALLEST_LEVELS = (*LEVELS, (0.0003, 0.0001), (0.00003, 0.00001))
+"""``LEVELS`` and further levels, for passages of a tenth of a millimetre [rad or m, m]."""
+
+SPACING = 0.02
+"""Distance between samples of a path in any scaled axis [m]: a box ends at a sample."""
+
+FINEST_SPACING, SMALLEST_SPACING = 0.002, 0.00004
+"""Samples closer than this are not refined any more [m]; the second one belongs to ``SMALLEST_LEVELS``."""
+
+REFINEMENT = 4
+"""Where no box holds two consecutive samples, so many intervals take the place of one."""
+
+FIRST_REACH = 4
+"""Samples in the first box that is tried, before the length of any box is known."""
+
+
+@dataclass(frozen=True)
+class PathBox:
+    """A free box along a path.
+
+    Attributes:
+        intervals: Intervals of (theta, q...).
+        positions: Positions p_WL; the team is free at every point of the polyline through them, for all
+            angles in the intervals, shape (k, 2) [m].
+    """
+
+    intervals: Intervals
+    positions: FloatArray
+
+
+class Certifier:
+    """Covers paths with boxes in one workspace.
+
+    Every box is proved free: its over-swept footprint touches no wall along the path, and no bodies touch.
+    Consecutive boxes share a sample of the path, padded in every angle. Where no box holds two consecutive
+    samples, the path is sampled more closely.
+
+    Args:
+        swept: Sweeps of the team's pieces.
+        pairs: Self-collision of the team.
+        workspace: Where the team may be; the margin is already taken off [m].
+        scale: How far a unit of each axis of z moves the team, shape (3 + n,).
+        margin: Clearance that the boxes' positions have beyond that [m].
+
+    Attributes:
+        trials: Boxes tried so far.
+    """
+
+    def __init__(
+        self,
+        swept: SweptTree,
+        pairs: BodyPairs,
+        workspace: Polygon | MultiPolygon,
+        scale: FloatArray,
+        margin: float,
+    ) -> None:
+        self._boxes = box_arrays(swept, pairs)
+        self._grid: ObstacleGrid = grid_inside(workspace, swept.tree.reach)
+        self._scale, self._margin = scale, margin
+        self._reach, self._level = FIRST_REACH, 0
+        self.trials = 0
+
+    def boxes(
+        self,
+        path: FloatArray,
+        progress: Callable[[float], None] | None = None,
+        *,
+        longest: bool = False,
+        smallest: bool = False,
+    ) -> list[PathBox] | None:
+        """Cover a path with boxes, from its first to its last configuration.
+
+        Args:
+            path: Configurations with circular axes unwrapped, the first one free, shape (m, 3 + n).
+            progress: Called with the fraction of the path that is covered.
+            longest: Whether to take the longest boxes, instead of those with the highest average speed.
+            smallest: Whether boxes may be as small as a passage of a millimetre needs; a transport through
+                them takes long.
+
+        Returns:
+            The boxes, or None if a part of the path cannot be covered.
+        """
+        levels = SMALLEST_LEVELS if smallest else FIRST_LEVELS if longest else LEVELS
+        finest = SMALLEST_SPACING if smallest else FINEST_SPACING
+        samples = densified(path, self._scale, SPACING)
+        boxes: list[PathBox] = []
+        i, self._level = 0, 0
+        while i < len(samples) - 1:
+            found = self._next_box(samples, i, longest, levels)
+            if found is None:
+                if np.abs((samples[i + 1] - samples[i]) * self._scale).max() < finest:
+                    return None
+                samples = _finer(samples, i)
+                continue
+            i, box = found
+            boxes.append(box)
+            if progress is not None:
+                progress(i / (len(samples) - 1))
+        return boxes
+
+    def _next_box(
+        self, samples: FloatArray, i: int, longest: bool, levels: tuple[tuple[float, float], ...]
+    ) -> tuple[int, PathBox] | None:
+        """The box that begins at sample i, and the sample at which it ends; None if there is none.
+
+        Levels wider than that of the box before by more than one are not tried: they would fail in narrow
+        passages again and again.
+        """
+        for level in range(max(self._level - 1, 0), len(levels)):
+            pad, clearance = levels[level]
+            fastest, furthest, trials = longest_box(
+                self._boxes, self._grid, samples, i, self._reach, pad, clearance, self._margin
+            )
+            self.trials += trials
+            self._reach = max(1, furthest - i)
+            j = furthest if longest else fastest
+            if j > i:
+                self._level = level
+                lower, upper = padded(self._boxes, samples, i, j, pad)
+                intervals = tuple((float(a), float(b)) for a, b in zip(lower, upper, strict=True))
+                return j, PathBox(intervals, samples[i : j + 1, :2].copy())
+        return None
+
+
+def _finer(samples: FloatArray, i: int) -> FloatArray:
+    """Samples with more of them between sample i and the next one."""
+    fraction = np.arange(1, REFINEMENT)[:, None] / REFINEMENT
+    between = samples[i] + fraction * (samples[i + 1] - samples[i])
+    return np.concatenate((samples[: i + 1], between, samples[i + 1 :]))
+
+
+def box_arrays(swept: SweptTree, pairs: BodyPairs) -> BoxArrays:
+    """Arrays of a team for the compiled boxes; a piece that several collision pairs need is swept once."""
+    rows = pairs.pieces.tolist()
+    needed = {(i, stages) for i, _, stages, _ in rows} | {(j, stages) for _, j, _, stages in rows}
+    sweeps = sorted(needed, key=lambda sweep: (-sweep[0], sweep[1]))
+    row = {sweep: k for k, sweep in enumerate(sweeps)}
+    infinite = np.array([np.inf])
+    return BoxArrays(
+        swept.arrays,
+        _table(sweeps),
+        _table([(row[i, first], row[j, second]) for i, j, first, second in rows]),
+        np.concatenate((-infinite, swept.tree.joint_lower)),
+        np.concatenate((infinite, swept.tree.joint_upper)),
+    )
+
+
+def _table(rows: Sequence[tuple[int, int]]) -> IntArray:
+    return np.array(rows, dtype=np.int64).reshape(-1, 2)

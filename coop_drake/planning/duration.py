@@ -1,25 +1,26 @@
-"""Compiled simulation of one transition: a point mass behind its governor, axes in their funnels.
-
-All laws are those of ``coop_drake.laws``. Only the direction of p_G differs from the closed loop: here it
-follows a path, there a harmonic map.
-"""
+"""How long a transport takes: by a rule of thumb, and estimated by integrating the loop from cell to cell."""
 
 from __future__ import annotations
 
-from math import hypot, sqrt
+from dataclasses import replace
+from math import hypot, inf, isfinite, sqrt
 
 import numpy as np
 
+from coop_drake.answers.plan import Plan
 from coop_drake.compiled import compiled
-from coop_drake.geometry.boundary import signed_distance
+from coop_drake.geometry.boundary import edges_of, signed_distance
 from coop_drake.geometry.distances import nearest_fraction
+from coop_drake.laws import TransitionGains
 from coop_drake.laws.axis_table import (
     FADING_TIME,
     LEAVING_TIME,
     LOG_GAIN,
     REST_RATE,
     SATURATION,
+    axis_table,
     bounds_of,
+    first_jumps,
     limited_row,
     rest_jump,
     track_row,
@@ -46,7 +47,35 @@ from coop_drake.laws.readiness import (
 from coop_drake.laws.speed_limit import speed_damping
 from coop_drake.tree.pose import FloatArray
 
-__all__ = ["PERIOD", "axis_frequency", "cross_cell"]
+# The time of a transition by rule of thumb, for choices made before gains are known.
+
+SETTLING_TIME = 0.6
+"""Time that angles and joints need at any distance, for choices made before gains are known [s]."""
+
+SPEED_PER_CLEARANCE = 3.0
+"""Speed over clearance with the paper's gains, for choices made before gains are known [1/s]."""
+
+
+def travel_time(length: float, clearance: float, speed: float = SPEED_PER_CLEARANCE) -> float:
+    """Return the time that the object needs for a path with the same clearance everywhere [s].
+
+    Args:
+        length: L, length of the path to the target [m].
+        clearance: b, clearance that the path keeps [m].
+        speed: Speed over clearance [1/s].
+    """
+    return length / (speed * clearance) if clearance > 0.0 else inf
+
+
+def transition_time(length: float, clearance: float, speed: float = SPEED_PER_CLEARANCE) -> float:
+    """Return an approximate time of one transition, ``SETTLING_TIME`` more than its travel [s]."""
+    return SETTLING_TIME + travel_time(length, clearance, speed)
+
+
+# Compiled simulation of one transition: a point mass behind its governor, axes in their funnels.
+#
+# All laws are those of ``coop_drake.laws``. Only the direction of p_G differs from the closed loop: here it
+# follows a path, there a harmonic map.
 
 PERIOD = 0.02
 """Time between two checks of readiness [s]: the longest step that the simulator takes by default."""
@@ -283,3 +312,85 @@ def cross_cell(
             _note_peaks(state, k1, peaks)
         time += PERIOD
     return np.inf
+
+
+# Estimates how long a transport takes, before its maps are solved and it is simulated.
+
+LONGEST_ESTIMATED = 120.0
+"""A transition that takes longer is not integrated to its end [s]; such a plan is of no use."""
+
+
+def speed_per_clearance(gains: TransitionGains) -> float:
+    """Return the speed of the governed object in a long aisle over its clearance there, v / d [1/s]."""
+    return 1.0 / steady_clearance(1.0, gains.stiffness, gains.damping, gains.governor_gain)
+
+
+def plan_time(plan: Plan) -> float:
+    """Return the estimated duration of the whole transport [s]."""
+    return sum(transition.estimated_time for transition in plan.transitions)
+
+
+def timed(plan: Plan) -> Plan:
+    """Return the plan with the times of ``estimated``."""
+    return estimated(plan)[0]
+
+
+def estimated(plan: Plan) -> tuple[Plan, FloatArray, FloatArray]:
+    """Estimate the time of every transition of a plan, and the largest speeds and accelerations.
+
+    The closed loop is integrated from cell to cell: a point mass behind the governor (14)-(16) with the exact
+    distance to the boundary of Q_i, a double integrator in its funnel for every axis, and the conditions of
+    readiness. The state is kept from cell to cell, because object and axes do not stop at a switch. p_G
+    follows the widest path instead of a harmonic map, which would have to be solved first.
+
+    Args:
+        plan: The plan; its present estimates are not read.
+
+    Returns:
+        The plan with estimates; ``transition_time`` where a transition is not left within two minutes. And
+        the largest speed of the object, then those of the axes (theta, q...), shape (2 + n,) [m/s, rad/s];
+        and the largest accelerations of the axes in every cell, shape (cells, 1 + n) [rad/s^2 or m/s^2].
+    """
+    crossings = [
+        (
+            np.ascontiguousarray(edges_of(plan.governed(index))),
+            _governor_row(plan, index),
+            axis_table(plan.funnel(index), transition.gains),
+        )
+        for index, transition in enumerate(plan.transitions)
+    ]
+    jumps = first_jumps(crossings[0][2], plan.start[2:])
+    following = [*crossings[1:], crossings[-1]]
+    state = _at_rest(plan.start[:2], plan.start[2:])
+    m = len(plan.start) - 2
+    transitions, speeds, accelerations = [], np.zeros(1 + m), np.zeros((len(crossings), m))
+    for index, (transition, (edges, gains, table)) in enumerate(
+        zip(plan.transitions, crossings, strict=True)
+    ):
+        last, peaks = index + 1 == len(crossings), np.zeros(1 + 2 * m)
+        next_edges, next_gains, next_table = following[index]
+        seconds = cross_cell(
+            state, jumps, edges, transition.path, gains, table, transition.inradius,
+            next_edges, next_gains, next_table, last, LONGEST_ESTIMATED, peaks,
+        )  # fmt: skip
+        speeds, accelerations[index] = np.maximum(speeds, peaks[: 1 + m]), peaks[1 + m :]
+        if not isfinite(seconds):
+            speed = speed_per_clearance(transition.gains)
+            seconds = LONGEST_ESTIMATED + transition_time(transition.length, transition.neck, speed)
+            state = _at_rest(transition.target, 0.5 * (transition.goal_lower + transition.goal_upper))
+            jumps[:] = 0.0
+        transitions.append(replace(transition, estimated_time=seconds))
+    return replace(plan, transitions=tuple(transitions)), speeds, accelerations
+
+
+def _governor_row(plan: Plan, index: int) -> FloatArray:
+    """Return the governor's row; the largest speed of p_G counts as one of the object."""
+    row = plan.governor_row(index)
+    if plan.tube is not None:
+        row[SPEED_LIMIT] = min(row[SPEED_LIMIT], plan.tube.speed)
+    return row
+
+
+def _at_rest(position: FloatArray, axes: FloatArray) -> FloatArray:
+    """Return the state (p, p', p_G, axes, axis rates) at rest."""
+    return np.concatenate([position, np.zeros(2), position, axes, np.zeros(len(axes))])

@@ -1,27 +1,33 @@
-"""How limits of bases are shared among the object's speed and the rates of its angle and of the joints.
-
-The speed of a base is at most the object's speed, plus the rate of each axis that moves the base times its
-lever, whatever the configuration; its turn rate is at most the sum of the rates of the object's angle and of
-the joints between. Limits of these speeds and rates, the same in the whole plan, therefore keep the limits of
-the bases. The limit of a base is shared in proportion to what each part would need without limits.
-"""
+"""Limits of speeds and accelerations: how a plan keeps them, and which of them refuse a plan."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from math import inf
 
 import numpy as np
 from numpy.typing import NDArray
 
-from coop_drake.answers.limits import SpeedStatement, TeamLimits
+from coop_drake.answers.limits import Refusal, SpeedStatement, TeamLimits, Unit
 from coop_drake.answers.plan import Plan
 from coop_drake.answers.problem import PlanningProblem
+from coop_drake.errors import TooQuickError
 from coop_drake.laws.readiness import RATE_TOLERANCE
 from coop_drake.laws.speed_limit import FUNNEL_SHARE, funnel_rate
-from coop_drake.planning.execution.estimate import estimated
+from coop_drake.planning.duration import estimated
 from coop_drake.tree.component_tree import ComponentTree
 from coop_drake.tree.levers import point_levers, turn_levers
 from coop_drake.tree.pose import FloatArray
+from coop_drake.tree.usual_unit import usual_unit
+
+# How limits of bases are shared among the object's speed and the rates of its angle and of the joints.
+#
+# The speed of a base is at most the object's speed, plus the rate of each axis that moves the base times
+# its lever, whatever the configuration; its turn rate is at most the sum of the rates of the object's angle
+# and of the joints between. Limits of these speeds and rates, the same in the whole plan, therefore keep
+# the limits of the bases. The limit of a base is shared in proportion to what each part would need without
+# limits.
 
 KEPT = 0.95
 """Share of every limit that is planned with [-]; the rest is for sampling, noise and integration."""
@@ -129,3 +135,90 @@ def _needs(plan: Plan) -> FloatArray:
         rates = [funnel_rate(*axis, quintic) for axis in zip(funnel.decay_rate, shrink, strict=True)]
         fastest[1:] = np.maximum(fastest[1:], np.array(rates) / FUNNEL_SHARE)
     return np.maximum(fastest, RATE_TOLERANCE)
+
+
+# The accelerations that a plan may command of its joints, and whether the estimated transport needs more.
+
+
+def planned_accelerations(limits: TeamLimits) -> FloatArray | None:
+    """Return the largest accelerations of (theta, q...) that may be commanded, None without any limit.
+
+    Returns:
+        ``KEPT`` of the joints' limits, infinity for the angle, shape (1 + n,) [rad/s^2 or m/s^2].
+    """
+    known = np.isfinite(limits.joint_accelerations).any()
+    return np.array([np.inf, *(KEPT * limits.joint_accelerations)]) if known else None
+
+
+def check_accelerations(plan: Plan, most: FloatArray) -> None:
+    """Refuse a plan in whose estimated transport the limit of a joint's acceleration acts.
+
+    That an axis stays in its funnel is shown for the law without this limit.
+
+    Args:
+        plan: The plan.
+        most: Largest accelerations of (theta, q...), shape (1 + n,) [rad/s^2 or m/s^2].
+
+    Raises:
+        TooQuickError: Names the first cell in which one acts, the joint and the limit.
+    """
+    acting = estimated(plan)[2] >= most
+    if acting.any():
+        cell, axis = np.argwhere(acting)[0]
+        raise TooQuickError(
+            f"cell {cell}: {plan.joint_names[axis - 1]} would be accelerated by more than {most[axis]:.3g}, "
+            "what its limit of acceleration leaves; expected a larger limit, or gains for older commands"
+        )
+
+
+# The limits of a scenario with which a plan along a way that exists cannot be carried out.
+
+GOAL_REGION_FRACTION = 0.9
+"""The region of the goal need not be wider than this fraction of the position tolerance [-]."""
+
+
+def without_limits(problem: PlanningProblem) -> PlanningProblem:
+    """The question for which no passage is too narrow, no transition too long and no joint too quick."""
+    settings = replace(problem.settings, min_clearance=0.0, max_transition_time=inf)
+    limits = replace(problem.limits, joint_accelerations=np.empty(0))
+    return replace(problem, settings=settings, limits=limits)
+
+
+def refusals(problem: PlanningProblem, plan: Plan) -> tuple[Refusal, ...]:
+    """Limits that a plan breaks, each with the cell in which it does so most; none if it can be carried out.
+
+    Args:
+        problem: What was asked, with the limits.
+        plan: A plan that may have been made without them.
+    """
+    return tuple(_refusals(problem, plan))
+
+
+def _refusals(problem: PlanningProblem, plan: Plan) -> Iterator[Refusal]:
+    settings, transitions = problem.settings, plan.transitions
+    least = usual_unit(problem.tree) * settings.min_clearance
+    clear = [min(transition.neck, transition.inradius) for transition in transitions]
+    if transitions[-1].inradius >= min(least, GOAL_REGION_FRACTION * problem.position_tolerance):
+        clear[-1] = transitions[-1].neck
+    yield from _broken(clear, -1, "planner.min_clearance", least, "m")
+    times = [transition.estimated_time for transition in transitions]
+    yield from _broken(times, 1, "planner.max_transition_time", settings.max_transition_time, "s")
+    most = planned_accelerations(problem.limits)
+    if most is not None:
+        shares = estimated(plan)[2] / most
+        axis = int(np.argmax(shares.max(axis=0)))
+        limit = float(problem.limits.joint_accelerations[axis - 1])  # Of it, a share is planned with.
+        values, joint = (limit * shares[:, axis]).tolist(), problem.tree.joints[axis - 1]
+        unit: Unit = "rad/s^2" if joint.kind == "revolute" else "m/s^2"
+        cell = int(np.argmax(shares[:, axis]))
+        if shares[cell, axis] >= 1.0:  # The gains' limit acts, if it has not been left out.
+            yield Refusal("limits.joint_accelerations", cell, values[cell], limit, unit, joint.name)
+
+
+def _broken(
+    values: Sequence[float], sign: int, limit: str, allowed: float, unit: Unit, joint: str = ""
+) -> Iterator[Refusal]:
+    """The cell that breaks a limit most: from above with sign 1, from below with -1."""
+    cell = max(range(len(values)), key=lambda k: sign * values[k])
+    if sign * values[cell] > sign * allowed:
+        yield Refusal(limit, cell, values[cell], allowed, unit, joint)

@@ -1,23 +1,119 @@
-"""Tries to prove infeasibility by exploring the question and its relaxations in turns."""
+"""Proofs that no plan exists: explorations of a question and of its parts, and of a disc inside the team."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from itertools import combinations
+from math import cos, pi
+
+import numpy as np
+import shapely
+from shapely import Polygon
+from shapely.errors import ShapelyError
+from shapely.geometry.base import BaseGeometry
 
 from coop_drake.answers.mixed_cell import MixedCell
-from coop_drake.answers.problem import PlanningProblem
+from coop_drake.answers.problem import PlanningProblem, goal_box
 from coop_drake.answers.proof import InfeasibilityProof
+from coop_drake.errors import GeometryError
+from coop_drake.geometry.convex import normals
+from coop_drake.geometry.minkowski import FreeSpace, to_polygon
+from coop_drake.geometry.piece_sweeps import over_piece
 from coop_drake.geometry.swept_tree import Intervals
-from coop_drake.planning.cells.cells import Region
-from coop_drake.planning.cells.events import Watch
-from coop_drake.planning.cells.exploration import Exploration, ExplorationResult, Verdict
-from coop_drake.planning.proofs.inscribed_disc import disc_refuted
-from coop_drake.planning.proofs.proof_making import slices_proof
-from coop_drake.planning.proofs.relaxation_test import RelaxationTest
-from coop_drake.planning.proofs.witnesses import Witnesses
-from coop_drake.planning.questions.relaxation import relaxed
+from coop_drake.planning.cells.cells import Region, regions_of
+from coop_drake.planning.cells.exploration import Exploration, ExplorationResult, Verdict, Watch
+from coop_drake.planning.certificates import LEAST_LOSS, Witnesses, disc_proof, slices_proof
+from coop_drake.planning.questions import ARC_SEGMENTS, inscribed_disc, marginal_workspace, relaxed, shrunk
+from coop_drake.planning.sampling.sampler import Sampler, SubsystemHierarchy
+from coop_drake.tree.component_tree import ComponentTree, ConvexShape
+from coop_drake.tree.pose import FloatArray
+
+# The inscribed-disc relaxation: if a disc inside the team cannot get from start to goal, the team cannot.
+
+_DIRECTIONS = normals(np.arange(0.0, 32.0) * (pi / 16.0))
+"""Corners of a regular polygon inside the unit disc, shape (32, 2) [-]: its radius is 0.5 % too small."""
+
+
+def disc_refuted(problem: PlanningProblem) -> InfeasibilityProof | None:
+    """Look for a disc inside one body whose centre cannot get from its start to its goal.
+
+    That is so if start and goal lie in different connected parts of the positions at which the disc fits.
+
+    Args:
+        problem: The question, whose margin is zero.
+
+    Returns:
+        The proof, or None if no disc is separated from its goal.
+    """
+    space = FreeSpace.over(problem.workspace)
+    for piece, component, disc in _discs(problem.tree):
+        centre, radius = disc.vertices[0], disc.radius
+        ring = radius * (1.0 - LEAST_LOSS) * _DIRECTIONS
+        regions = regions_of(space.minus(ring), over=True)
+        start = problem.tree.poses(problem.start)[component].apply(disc.vertices)[0]
+        goals = _places(problem, component, centre)
+        reached = [to_polygon(region.section) for region in regions if region.holds(start)]
+        if not any(polygon.intersects(goals) for polygon in reached):
+            found = disc_proof(problem.tree, component, centre, ring, piece, regions, start, goals)
+            if found is not None:
+                return found
+    return None
+
+
+def _discs(tree: ComponentTree) -> Iterator[tuple[int, int, ConvexShape]]:
+    """For every convex piece its number, its component and the largest disc inside the piece."""
+    number = -1
+    for index, component in enumerate(tree.components):
+        for body in component.bodies:
+            for shape in body.shapes:
+                disc, number = inscribed_disc(shape), number + 1
+                if disc.radius > 0.0:
+                    yield number, index, disc
+
+
+def _places(problem: PlanningProblem, component: int, centre: FloatArray) -> BaseGeometry:
+    """A convex polygon that holds all places in W where a point of a component can be at the goal."""
+    tree, bounds = problem.tree, np.array(goal_box(problem))
+    point = tree.arrays._replace(pieces=np.array([[component, 0, 1]]), vertices=centre[None, :].copy())
+    ring = over_piece(
+        point, 0, bounds[:, 0].copy(), bounds[:, 1].copy(), len(tree.ancestors[component]), False
+    )
+    places = shapely.MultiPoint(ring + problem.goal_pose[:2]).convex_hull
+    return places.buffer(problem.position_tolerance / cos(pi / (4.0 * ARC_SEGMENTS)), quad_segs=ARC_SEGMENTS)
+
+
+# The relaxation test: which relaxations are worth a proof, because sampling finds no path for them.
+
+TEST_SAMPLES = 8_000
+"""Samples for every subsystem: twice those of a first attempt, because a failure costs an exploration."""
+
+TEST_SEED = 101
+"""Seed of the samples, other than those of the search, which have failed already."""
+
+
+class RelaxationTest:
+    """Tests by sampling whether a part of the team has a path; a path makes a proof for that part impossible.
+
+    Args:
+        problem: The question.
+    """
+
+    def __init__(self, problem: PlanningProblem) -> None:
+        self._problem = problem
+        self._workspace = shrunk(problem.workspace, 0.0)
+        self._failed: dict[tuple[int, ...], bool] = {}
+
+    def finds_no_path(self, robots: tuple[int, ...]) -> bool:
+        """Whether sampling finds no path for the object with some robots, which proves nothing."""
+        if robots not in self._failed:
+            question, _ = relaxed(self._problem, robots)
+            sampler = Sampler(SubsystemHierarchy(question), self._workspace, 0.0, TEST_SEED)
+            self._failed[robots] = len(sampler.path(TEST_SAMPLES)) == 0
+        return self._failed[robots]
+
+
+# Tries to prove infeasibility by exploring the question and its relaxations in turns.
 
 WHOLE_DIVISOR = 2
 """While relaxations are explored too, the whole question gets half of the slices of each [-]: a refutation
@@ -208,3 +304,115 @@ class Proofs:
         reason = f"the over-approximations of {self._words(chosen)} separate start from goal"
         self.refutation = Refutation(reason, chosen, proof)
         return True
+
+
+# Proofs on large floors from the walls near the goal or the start alone: all else counts as free.
+
+MANY_CORNERS = 300
+"""On floors with fewer corners [-] the question is explored as it is."""
+
+REACHES_AT_END = 8.0
+"""Walls count up to so many reaches of the team from the goal or start, along x and along y [-]."""
+
+OVERLAP_AT_END = 1e-3
+"""What counts as free overlaps that part of the floor by this many reaches [-], so that rounding puts no wall
+between them."""
+
+REACHES_BEYOND = 4.0
+"""It extends so many reaches beyond the floor [-]: no piece of a team off the floor is inside it."""
+
+SLICES_AT_END = 250
+"""Slices of each exploration: a second of work."""
+
+ROBOTS_AT_END = 1
+"""Robots that are kept in the first explorations."""
+
+
+def refuted_at_an_end(problem: PlanningProblem, watch: Watch | None = None) -> tuple[Refutation | None, int]:
+    """Look for a proof that the team cannot leave the start, or reach the goal, for walls near it.
+
+    What is proved on a floor that holds the question's floor is proved for the question.
+
+    Args:
+        problem: The question.
+        watch: Called with the events of explorations.
+
+    Returns:
+        The proof, None if there is none or the floor is small, and the slices made.
+    """
+    slices = 0
+    if shapely.get_num_coordinates(problem.workspace) < MANY_CORNERS:
+        return None, 0
+    for end in (problem.goal_pose[:2], problem.start[:2]):
+        question = _opened(problem, end)
+        proofs = None if question is None else Proofs(question, watch)
+        if proofs is None:
+            continue
+        for robots in (ROBOTS_AT_END, None):
+            if proofs.run(SLICES_AT_END, robots) in (Verdict.FOUND, Verdict.INFEASIBLE):
+                break
+        slices += proofs.slices
+        if proofs.refutation is not None:
+            return proofs.refutation, slices
+    return None, slices
+
+
+def _opened(problem: PlanningProblem, centre: FloatArray) -> PlanningProblem | None:
+    """The question with a floor that has walls near a point only; None if geometry fails."""
+    (x, y), reach = centre, problem.tree.reach
+    near, inner = (
+        shapely.box(x - half, y - half, x + half, y + half)
+        for half in (REACHES_AT_END * reach, (REACHES_AT_END - OVERLAP_AT_END) * reach)
+    )
+    ends = shapely.MultiPoint([problem.start[:2], problem.goal_pose[:2]])
+    hull = shapely.union_all([problem.workspace.envelope, near, ends]).envelope
+    try:
+        outside = hull.buffer(REACHES_BEYOND * reach, join_style="mitre").difference(inner)
+        floor = problem.workspace.intersection(near).union(outside)
+    except ShapelyError:
+        return None
+    return replace(problem, workspace=floor) if isinstance(floor, Polygon) else None
+
+
+# An upper bound on the clearance of any path: proofs at margins above zero, for undecided questions.
+
+BOUND_CLEARANCES = (0.08, 0.04, 0.02, 0.01)
+"""Clearances that are tried, largest first [m]."""
+
+INSIDE_OCTAGON = 0.92
+"""Workspaces are shrunk by an octagon about a disc; a disc of this fraction of the clearance has its octagon
+inside the disc of the clearance, because cos(pi / 8) is 0.924 [-]."""
+
+BOUND_SLICES = 128
+"""Slices of each exploration: enough for a clear case, and little beside the search that went before."""
+
+
+def clearance_bound(problem: PlanningProblem) -> tuple[float | None, int]:
+    """The smallest of some clearances of which it is proved that no path keeps it from the walls.
+
+    The proofs are for the object with at most one robot. The start and the goal may stand closer to a wall:
+    near them the clearance is not required.
+
+    Returns:
+        The clearance [m], None if none was refuted, and the slices made for the proofs.
+    """
+    bound, slices = None, 0
+    parts: list[tuple[int, ...]] = [(), *[(r,) for r in sorted({j.robot for j in problem.tree.joints})]]
+    for clearance in BOUND_CLEARANCES:
+        refuted = False
+        for chosen in parts:
+            question, _ = relaxed(problem, chosen)
+            try:
+                workspace = marginal_workspace(problem, INSIDE_OCTAGON * clearance)
+            except GeometryError:
+                return bound, slices
+            outcome = Exploration(question, workspace).run(BOUND_SLICES)
+            slices += outcome.slices
+            refuted = outcome.verdict is Verdict.INFEASIBLE
+            if refuted:
+                parts = [chosen, *[part for part in parts if part != chosen]]
+                break
+        if not refuted:
+            return bound, slices
+        bound = clearance
+    return bound, slices

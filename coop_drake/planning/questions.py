@@ -1,25 +1,106 @@
-"""Workspaces shrunk by a margin, except near a start or goal that stands close to a wall (rule 1)."""
+"""Checks of a question, and questions derived from it: with other floors, fewer robots, another end."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
+from dataclasses import replace
 from functools import lru_cache
 from math import pi
 
 import numpy as np
 import shapely
 from numpy.typing import NDArray
-from shapely import MultiPolygon, Polygon
+from shapely import MultiPolygon, Point, Polygon
 from shapely.geometry.base import BaseGeometry
 
-from coop_drake.answers.problem import PlanningProblem
-from coop_drake.errors import GeometryError
+from coop_drake.answers.limits import TeamLimits
+from coop_drake.answers.problem import ROUNDING, PlanningProblem, at_goal, goal_box
+from coop_drake.errors import GeometryError, PlanError
 from coop_drake.geometry import safeguards
 from coop_drake.geometry.convex import normals
 from coop_drake.geometry.minkowski import FreeSpace, to_polygon
 from coop_drake.geometry.parts import parts_of, polygon_rings
-from coop_drake.tree.component_tree import Component, ComponentTree
+from coop_drake.tree.circles import nearest_turn
+from coop_drake.tree.component_tree import Component, ComponentTree, ConvexShape, TreeJoint
 from coop_drake.tree.pose import FloatArray
+
+# Checks of a question before the search: finite numbers of the right count, joints within their limits.
+
+
+def check_question(problem: PlanningProblem) -> None:
+    """Refuse a question without meaning.
+
+    Raises:
+        PlanError: Names the entry, its value and what is allowed.
+    """
+    joints = problem.tree.joints
+    _check_numbers("start", problem.start, 3 + len(joints), "x, y, theta and every joint")
+    _check_numbers("goal_pose", problem.goal_pose, 3, "x, y and theta")
+    if len(problem.goal_joints) != len(joints):
+        raise PlanError(
+            f"goal_joints: {list(problem.goal_joints)} is not allowed; expected {len(joints)} entries, a "
+            f"value or None for every joint"
+        )
+    if not np.isfinite(shapely.get_coordinates(problem.workspace)).all():
+        raise PlanError("workspace: has corners that are not allowed; expected finite numbers")
+    for joint in joints:
+        endless = joint.circular and joint.kind == "revolute"
+        if not (endless or -np.inf < joint.lower <= joint.upper < np.inf):
+            raise PlanError(
+                f"limits of {joint.name}: [{joint.lower}, {joint.upper}] are not allowed; expected two "
+                f"finite limits, the lower one first, or none for a revolute joint, which is a circle then"
+            )
+        start, goal = float(problem.start[3 + joint.index]), problem.goal_joints[joint.index]
+        if not _within(start, joint):
+            raise PlanError(
+                f"start: {start} of {joint.name} is not allowed; expected a value within its limits "
+                f"[{joint.lower}, {joint.upper}]"
+            )
+        if goal is not None and not np.isfinite(goal):
+            raise PlanError(f"goal_joints: {goal} of {joint.name} is not allowed; expected a finite number")
+
+
+def goal_beyond_limits(problem: PlanningProblem) -> str | None:
+    """A sentence that names a joint whose goal is beyond its limits by more than its tolerance, or None."""
+    for joint, (low, high) in zip(problem.tree.joints, goal_box(problem)[1:], strict=True):
+        if low > high:
+            goal, limits = problem.goal_joints[joint.index], f"[{joint.lower}, {joint.upper}]"
+            return (
+                f"at the goal {joint.name} is {goal}, beyond its limits {limits} by more than its tolerance"
+            )
+    return None
+
+
+def _check_numbers(key: str, values: FloatArray, count: int, names: str) -> None:
+    if np.shape(values) != (count,) or not np.isfinite(values).all():
+        raise PlanError(
+            f"{key}: {np.asarray(values).tolist()} is not allowed; expected {count} finite numbers: {names}"
+        )
+
+
+def _within(value: float, joint: TreeJoint) -> bool:
+    return joint.lower - ROUNDING <= value <= joint.upper + ROUNDING
+
+
+# The part of a floor near some positions: what a team there may meet, and some more.
+
+EXTRA_FLOOR = 1.0
+"""The part of a floor near a path reaches this much further than the team [m]: wide cells are faster."""
+
+
+def nearby(floor: Polygon | MultiPolygon, positions: FloatArray, reach: float) -> MultiPolygon:
+    """The part of a floor that a team at some positions can touch, and ``EXTRA_FLOOR`` around it.
+
+    Args:
+        floor: Polygons with holes [m].
+        positions: Positions p_WL, shape (k, 2) [m].
+        reach: Distance of the team's furthest point from p_WL [m].
+    """
+    lower, upper = positions.min(axis=0) - reach - EXTRA_FLOOR, positions.max(axis=0) + reach + EXTRA_FLOOR
+    return MultiPolygon(parts_of(floor.intersection(shapely.box(*lower, *upper))))
+
+
+# Workspaces shrunk by a margin, except near a start or goal that stands close to a wall (rule 1).
 
 SMALLEST_MARGIN = 0.005
 """Smaller margins are not tried: they are within the accuracy of a real floor [m]."""
@@ -157,3 +238,104 @@ def _pieces(
     owners = np.repeat(np.arange(len(placed)), [len(vertices) for vertices, _ in placed])
     corners = shapely.multipoints(np.concatenate([vertices for vertices, _ in placed]), indices=owners)
     return np.asarray(shapely.convex_hull(corners)), np.array([radius for _, radius in placed])
+
+
+# Relaxations: the same question with fewer robots or a disc; if one is infeasible, the question is too.
+
+POLE_TOLERANCE = 1e-4
+"""Accuracy of the radius of an inscribed disc, unless another one is asked for [m]."""
+
+
+def relaxed(problem: PlanningProblem, robots: Collection[int]) -> tuple[PlanningProblem, tuple[int, ...]]:
+    """The question with only some of the robots.
+
+    Args:
+        problem: The whole question.
+        robots: Robots whose arms and bases are kept; bodies welded to the object are kept in any case.
+
+    Returns:
+        The relaxed question, and for each of its joints the index of that joint in the whole q.
+    """
+    tree = problem.tree
+    kept = [
+        index
+        for index, component in enumerate(tree.components)
+        if component.joint is None or component.joint.robot in robots
+    ]
+    joints = [joint.index for joint in tree.joints if joint.robot in robots]
+    components = tuple(_renumbered(tree.components[index], kept, joints) for index in kept)
+    question = replace(
+        problem,
+        tree=ComponentTree(components, tree.unchecked_pairs),
+        start=np.concatenate((problem.start[:3], problem.start[3:][joints])),
+        goal_joints=tuple(problem.goal_joints[index] for index in joints),
+        joint_tolerance=np.broadcast_to(problem.joint_tolerance, len(tree.joints))[joints],
+        limits=TeamLimits(),
+    )
+    return question, tuple(joints)
+
+
+def _renumbered(component: Component, kept: list[int], joints: list[int]) -> Component:
+    if component.joint is None or component.parent is None:
+        return component
+    joint = replace(component.joint, index=joints.index(component.joint.index))
+    return replace(component, parent=kept.index(component.parent), joint=joint)
+
+
+def inscribed_disc(shape: ConvexShape, tolerance: float = POLE_TOLERANCE) -> ConvexShape:
+    """The largest disc inside a convex shape; of radius zero for a shape without interior.
+
+    Args:
+        shape: The shape.
+        tolerance: A larger disc may be larger by this much [m].
+    """
+    if len(shape.vertices) < 3:
+        return ConvexShape(shape.vertices.mean(axis=0, keepdims=True), shape.radius)
+    ring = Polygon(shape.vertices)
+    pole = shapely.maximum_inscribed_circle(ring, tolerance=tolerance)
+    centre = np.asarray(pole.coords[0])
+    return ConvexShape(centre[None, :], float(ring.exterior.distance(Point(centre))) + shape.radius)
+
+
+# The question of ending at one configuration of the goal.
+
+SAME_END = 1e-9
+"""Ends that differ by less in every axis are one end that was rounded [m, rad]."""
+
+
+def ending_at(problem: PlanningProblem, end: FloatArray) -> PlanningProblem:
+    """The question of ending at one configuration of the goal, with what the tolerances leave about it.
+
+    Args:
+        problem: The question.
+        end: z, in the goal; what it says of joints without a goal does not matter, shape (3 + n,) [m, rad].
+
+    Returns:
+        The question; the same one if it is the middle of the goal.
+    """
+    goal = at_goal(problem.goal_pose, problem.goal_joints, end[3:])
+    away = end - goal
+    away[2:] = np.where(problem.tree.circular, [nearest_turn(angle) for angle in away[2:].tolist()], away[2:])
+    away = np.abs(away)
+    if away.max() <= SAME_END:
+        return problem
+    values = zip(problem.goal_joints, end[3:].tolist(), strict=True)
+    return replace(
+        problem,
+        goal_pose=end[:3].copy(),
+        goal_joints=tuple(None if goal is None else value for goal, value in values),
+        position_tolerance=problem.position_tolerance - float(np.hypot(*away[:2])),
+        angle_tolerance=problem.angle_tolerance - float(away[2]),
+        joint_tolerance=problem.joint_tolerance - away[3:],
+        roomy=False,
+    )
+
+
+def within_limits(problem: PlanningProblem) -> PlanningProblem:
+    """The question with goals of joints that are beyond their limits moved to what these leave of them."""
+    end = at_goal(problem.goal_pose, problem.goal_joints, 0.0)
+    lower, upper = np.array(goal_box(problem))[1:].T.reshape(2, -1)
+    known = np.array([goal is not None for goal in problem.goal_joints], dtype=bool)
+    beyond = known & ((end[3:] < lower) | (end[3:] > upper))
+    end[3:] = np.where(beyond, 0.5 * (lower + upper), end[3:])
+    return ending_at(problem, end)

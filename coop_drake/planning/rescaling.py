@@ -17,10 +17,10 @@ from coop_drake.answers.plan import Cell, Plan
 from coop_drake.answers.problem import PlannerSettings, PlanningProblem
 from coop_drake.answers.proof import Cut, InfeasibilityProof, OverCell, OverSlice
 from coop_drake.laws.gains import FixedGains, GainSet
-from coop_drake.planning.boxes.channel import Channel, CoveredPath, FreeBox, NoChannel
 from coop_drake.planning.cells.cells import Region
-from coop_drake.planning.cells.events import ChannelSearched, Event, SeenCell, SliceAdded, Watch
-from coop_drake.planning.questions.margins import SMALLEST_MARGIN
+from coop_drake.planning.cells.exploration import ChannelSearched, Event, SeenCell, SliceAdded, Watch
+from coop_drake.planning.channel import Channel, CoveredPath, FreeBox, NoChannel
+from coop_drake.planning.questions import SMALLEST_MARGIN
 from coop_drake.tree.component_tree import Component, ComponentTree, ConvexShape
 from coop_drake.tree.pose import FloatArray, PlanarPose
 

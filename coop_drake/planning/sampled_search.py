@@ -2,35 +2,206 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from dataclasses import replace
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from functools import partial
+from itertools import product
 
 import numpy as np
 from shapely.errors import ShapelyError
 
-from coop_drake.answers.problem import PlanningProblem
+from coop_drake.answers.problem import PlanningProblem, at_goal, goal_box
 from coop_drake.errors import GeometryError
 from coop_drake.geometry.body_pairs import BodyPairs
 from coop_drake.geometry.swept_tree import SweptTree
-from coop_drake.planning.boxes.boxes import Regions, make_channel
-from coop_drake.planning.boxes.certify import Certifier
-from coop_drake.planning.boxes.channel import Channel, CoveredPath
-from coop_drake.planning.questions.margins import exact_footprint, marginal_workspace
-from coop_drake.planning.sampling.clear_paths import (
+from coop_drake.planning.boxes import Certifier, PathBox
+from coop_drake.planning.channel import Channel, CoveredPath, Regions, make_channel
+from coop_drake.planning.questions import (
+    ending_at,
+    exact_footprint,
+    marginal_workspace,
+    shrunk,
+    within_limits,
+)
+from coop_drake.planning.sampling.band import (
     another_candidate,
     best_candidate,
     margins_to_try,
     moved_from_obstacles,
+    smoothed,
 )
-from coop_drake.planning.sampling.elastic_band import smoothed
-from coop_drake.planning.sampling.guided_samples import GuidePath
-from coop_drake.planning.sampling.sampler import FEW_JOINTS, Sampler
-from coop_drake.planning.sampling.subsystems import SubsystemHierarchy
-from coop_drake.planning.search.attempt import LIGHT_ATTEMPTS, BoxSequence, Tried, samples_of_attempt
-from coop_drake.planning.search.narrow_search import BODY_GAP, NarrowSearch
+from coop_drake.planning.sampling.collision import ObstacleGrid, grid_for_team, is_free
+from coop_drake.planning.sampling.narrow_passages import centred, repaired, widened_floor
+from coop_drake.planning.sampling.sampler import FEW_JOINTS, Sampler, SubsystemHierarchy
+from coop_drake.planning.sampling.trees import GuidePath
 from coop_drake.tree.levers import configuration_scale
 from coop_drake.tree.pose import FloatArray
+
+# What comes of one attempt to sample a path and to cover it with boxes.
+
+FEW_SAMPLES = 4_000
+"""Samples for every subsystem in the first attempt; enough for most floors, at a tenth of a second."""
+
+LIGHT_ATTEMPTS = 4
+"""Attempts with few samples, before those with many begin."""
+
+MANY_SAMPLES = 16_000
+"""Samples for every subsystem in later attempts, about a second each."""
+
+LARGEST_SHARE = 2
+"""So many times as many are drawn at most [-]: twice as many take three times as long."""
+
+
+@dataclass(frozen=True)
+class BoxSequence:
+    """Boxes along a path that are proved free; a channel without its polygons.
+
+    Attributes:
+        boxes: From the start's box to the goal's box.
+        path: The path that they cover, circular axes unwrapped, shape (m, 3 + n) [m, rad].
+        margin: The margin that the path's positions keep in every box [m].
+    """
+
+    boxes: tuple[PathBox, ...]
+    path: FloatArray
+    margin: float
+
+
+@dataclass(frozen=True)
+class Tried:
+    """What comes of one attempt.
+
+    Attributes:
+        found: Boxes along its path, if they cover it.
+        path: The path, None if there is none, shape (m, 3 + n) [m, rad].
+        blocked: Whether no path was found even for the object alone; None if that is unknown.
+        failed: Whether geometry failed.
+        trials: Boxes tried.
+        short: How far walls have to be moved back for the path; zero or less if it fits the floor [m].
+    """
+
+    found: BoxSequence | None = None
+    path: FloatArray | None = None
+    blocked: bool | None = None
+    failed: bool = False
+    trials: int = 0
+    short: float = 0.0
+
+
+def samples_of_attempt(number: int) -> int:
+    """Samples for every subsystem in an attempt, counted from 1: few at first, then many."""
+    if number <= LIGHT_ATTEMPTS:
+        return FEW_SAMPLES * luby(number)
+    return MANY_SAMPLES * min(luby(number - LIGHT_ATTEMPTS), LARGEST_SHARE)
+
+
+def luby(number: int) -> int:
+    """Luby's sequence of budgets for restarts, 1 1 2 1 1 2 4 and so on, counted from 1."""
+    size = int(np.log2(number + 1))
+    return 1 << size - 1 if number + 1 == 1 << size else luby(number + 1 - (1 << size))
+
+
+# Search through passages that are too narrow for samples: paths on larger floors are repaired.
+
+BODY_GAP = 0.01
+"""Distance that paths keep between bodies of the team [m]."""
+
+FLOOR_GROWTHS, SEEDS_PER_GROWTH = (0.1, 0.06, 0.03), 2
+"""Amounts by which walls are moved back for paths through narrow passages [m], largest first because these
+are the easiest to sample, and random seeds for each of them."""
+
+NARROW_SAMPLES = 16_000
+"""Samples for every subsystem on these floors: fewer often find no path near the critical width."""
+
+CENTRED_PATHS, CENTRED_SHORT = 3, 0.005
+"""So many of these paths, those that fit the floor best, are moved to the middle of their passages; those
+that still need the walls this far back are left out [m]."""
+
+Covered = Callable[[FloatArray, bool], BoxSequence | None]
+"""Covers a path with boxes that are proved free, the smallest ones if its second argument says so."""
+
+
+class NarrowSearch:
+    """Samples paths on larger floors, repairs them until they fit the floor, and covers them with boxes.
+
+    Args:
+        problem: The question.
+        hierarchy: Its subsystems.
+        covered: Covers a path with boxes.
+    """
+
+    def __init__(self, problem: PlanningProblem, hierarchy: SubsystemHierarchy, covered: Covered) -> None:
+        self._problem, self._hierarchy, self._covered = problem, hierarchy, covered
+
+    def tries(
+        self, number: int, progress: Callable[[float], None] | None, *, object_first: bool
+    ) -> list[Callable[[], Tried]]:
+        """The attempts of one round as functions to call, with other random numbers in every round.
+
+        The first round adds robot after robot, later ones sample all robots at once: added one by one they
+        go where the object alone goes most easily.
+
+        Args:
+            number: The round, counted from 0.
+            progress: Called with the fraction of an attempt that is done.
+            object_first: Whether attempts of later rounds repair a path of the object alone first, and end
+                where it does not fit the floor. This is not done for parts of the team with robots: their
+                paths are repaired to other places than the team's, and ways were lost by it.
+        """
+        first = SEEDS_PER_GROWTH * max(0, number - 1)
+        seeds = range(first, first + SEEDS_PER_GROWTH)
+        ways = product(seeds, FLOOR_GROWTHS)
+        return [partial(self._repaired, number > 0, object_first, *way, progress) for way in ways]
+
+    def _repaired(
+        self,
+        direct: bool,
+        object_first: bool,
+        seed: int,
+        growth: float,
+        progress: Callable[[float], None] | None,
+    ) -> Tried:
+        """Sample a path on a larger floor, repair it, and cover it if it fits."""
+        floor = widened_floor(self._problem.workspace, growth)
+        sampler = Sampler(self._hierarchy, floor, BODY_GAP, seed, progress)
+        if not direct:
+            path = sampler.path(NARROW_SAMPLES)
+        elif object_first:
+            guide = self._repaired_object(sampler, growth)
+            if guide is None:
+                return Tried()
+            path = sampler.path_around(guide, NARROW_SAMPLES)
+        else:
+            path = sampler.direct_path(NARROW_SAMPLES)
+        if not len(path):
+            return Tried()
+        path, short = repaired(self._problem, path, growth)
+        found = None if short > 0.0 else self._covered(path, False)
+        return Tried(found, path, short=short)
+
+    def _repaired_object(self, sampler: Sampler, growth: float) -> GuidePath | None:
+        """Path of the object alone, repaired; None if there is none that almost fits the floor."""
+        guide = sampler.direct((), NARROW_SAMPLES)
+        if guide is None:
+            return None
+        path, short = repaired(self._hierarchy.subsystem(()).question, guide.path, growth)
+        return None if short > CENTRED_SHORT else GuidePath(path, guide.joints)
+
+    def through_middle(self, done: Sequence[Tried]) -> BoxSequence | None:
+        """Cover the path of one of some attempts, those that fit best first, in the middle of its passages.
+
+        The boxes are the smallest ones, so a transport through them takes long.
+        """
+        fitting = [
+            (one.short, one.path) for one in done if one.path is not None and one.short < CENTRED_SHORT
+        ]
+        for needed, path in sorted(fitting, key=lambda one: one[0])[:CENTRED_PATHS]:
+            moved, short = centred(self._problem, path, needed)
+            found = None if short > 0.0 else self._covered(moved, True)
+            if found is not None:
+                return found
+        return None
+
 
 CLEARANCES = (0.015, 0.01), (0.002, 0.002)
 """Clearances from the walls, and distances between bodies of the team, with which paths are sampled, in turns
@@ -271,3 +442,68 @@ class SampledSearch:
             return None
         ends = np.array([box.positions[-1] for box in found.boxes])
         return replace(make_channel(self._problem, made, found.margin, found.path), ends=ends)
+
+
+# A free end within the goal's tolerances, where the middle of the goal is not free.
+
+ENDS, TRIED_AT_END = 64, 16
+"""Ends that are tried, and values of the free joints that are tried at each [-]."""
+
+END_DISTANCES = (0.015, 0.005, 0.002, 0.0)
+"""Distances from walls that an end shall keep, in the order tried [m]."""
+
+WITHIN_GOAL = 0.9
+"""Share of the tolerances that ends lie in, so that some of them is left about an end [-]."""
+
+
+def ending_freely(problem: PlanningProblem) -> PlanningProblem | None:
+    """The question of ending at a free configuration of the goal, if one is found and its middle is not free.
+
+    A middle that is nearer to walls than ``planner.min_clearance`` is left for an end that is not. Of ends
+    that keep the same distance from walls it is the one about which most of the tolerances is left.
+    """
+    middle, random = within_limits(problem), np.random.default_rng(0)
+    middles, least = _ends_in(problem, random, 0.0), problem.settings.min_clearance
+    free = middle is problem and len(_free_ends(problem, middles, 0.0)) > 0
+    if free and _free_ends(problem, middles, least):
+        return None
+    ends = _ends_in(problem, random, WITHIN_GOAL)
+    for distance in END_DISTANCES:
+        if free and distance < least:
+            return None
+        asked = [ending_at(problem, end) for end in _free_ends(problem, ends, distance)]
+        if asked:
+            return max(asked, key=lambda one: _least_left(one, problem))
+    return None
+
+
+def _ends_in(problem: PlanningProblem, random: np.random.Generator, share: float) -> FloatArray:
+    """Configurations in a share of the goal, or in its middle, with values of the free joints, (k, 3 + n)."""
+    low, high = np.array(goal_box(problem)).T
+    aimed = np.array([True, *[goal is not None for goal in problem.goal_joints]])
+    middle = at_goal(problem.goal_pose, problem.goal_joints, 0.0)[2:] if share == 0.0 else 0.5 * (low + high)
+    spread = np.repeat(random.uniform(-share, share, (ENDS, len(low))), TRIED_AT_END, axis=0)
+    spread[:, ~aimed] = random.uniform(-1.0, 1.0, (ENDS * TRIED_AT_END, int((~aimed).sum())))
+    axes = np.where(aimed, middle, 0.5 * (low + high)) + 0.5 * (high - low) * spread
+    away = problem.position_tolerance * share * np.sqrt(random.random(ENDS))
+    turn = random.uniform(0.0, 2.0 * np.pi, ENDS)
+    places = problem.goal_pose[:2] + np.column_stack((away * np.cos(turn), away * np.sin(turn)))
+    return np.column_stack((np.repeat(places, TRIED_AT_END, axis=0), axes))
+
+
+def _free_ends(problem: PlanningProblem, ends: FloatArray, distance: float) -> list[FloatArray]:
+    """Those of some ends that are free and keep a distance from walls [m]."""
+    team = problem.tree.arrays
+    try:
+        grid: ObstacleGrid = grid_for_team(shrunk(problem.workspace, distance), team)
+    except GeometryError:
+        return []
+    return [end for end in ends if is_free(team, grid, end, 0.0)]
+
+
+def _least_left(asked: PlanningProblem, problem: PlanningProblem) -> float:
+    """The least share of a tolerance that is left about an end [-]."""
+    joints = np.asarray(asked.joint_tolerance) / problem.joint_tolerance
+    position = asked.position_tolerance / problem.position_tolerance
+    angle = asked.angle_tolerance / problem.angle_tolerance
+    return float(min(position, angle, joints.min(initial=1.0)))

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from math import cos, isfinite, pi, sin
+from itertools import pairwise
+from math import cos, inf, isfinite, pi, sin, tau
 from typing import Any
 
 import numpy as np
@@ -13,29 +14,277 @@ from shapely import Point, Polygon
 
 from coop_drake.answers.digest import problem_digest
 from coop_drake.answers.plan import Cell, Plan, Transition
-from coop_drake.answers.problem import PlanningProblem
-from coop_drake.errors import GeometryError, StallError
+from coop_drake.answers.problem import PlanningProblem, goal_box
+from coop_drake.errors import GeometryError, PlanError, StallError
 from coop_drake.geometry.boundary import BoundaryDistance
-from coop_drake.geometry.parts import component_at
-from coop_drake.geometry.passage import Passage, PassageFinder
+from coop_drake.geometry.parts import component_at, parts_of
+from coop_drake.geometry.passage import Passage, PassageFinder, pole
 from coop_drake.geometry.tidy import tidy_cell
 from coop_drake.laws import GainSet, ScheduledGains, TransitionGains, transition_gains
-from coop_drake.planning.boxes.channel import Channel, FreeBox
-from coop_drake.planning.execution.acceleration_limits import check_accelerations, planned_accelerations
-from coop_drake.planning.execution.channel_ends import (
-    Bounds,
-    check_ends,
-    goal_intervals,
-    goal_values,
-    turned_to_start,
+from coop_drake.planning.channel import Channel, FreeBox
+from coop_drake.planning.duration import plan_time, timed, transition_time, travel_time
+from coop_drake.planning.limits import (
+    GOAL_REGION_FRACTION,
+    check_accelerations,
+    limits_of,
+    planned_accelerations,
+    speed_shares,
+    stated_speeds,
 )
-from coop_drake.planning.execution.estimate import plan_time, timed
-from coop_drake.planning.execution.refusals import GOAL_REGION_FRACTION
-from coop_drake.planning.execution.speed_shares import limits_of, speed_shares, stated_speeds
-from coop_drake.planning.execution.targets import targets_of
-from coop_drake.planning.travel_time import travel_time
 from coop_drake.progress import Progress
+from coop_drake.tree.circles import nearest_turn
 from coop_drake.tree.pose import FloatArray
+
+# The ends of a channel: checked, turned to the start; and the goal intervals of each of its boxes.
+
+GOAL_FRACTION = 0.9
+"""Fraction of the goal's intervals that a plan ends in, so that it is within tolerance at their edges [-]."""
+
+Bounds = tuple[FloatArray, FloatArray]
+"""Lower and upper ends of (theta, q...), shape (1 + n,) each [rad, m]."""
+
+
+def goal_values(problem: PlanningProblem, goal_angle: float, near: FloatArray) -> tuple[float | None, ...]:
+    """Values of (theta, q...) at the goal, None for joints that are free there.
+
+    Args:
+        problem: What was asked.
+        goal_angle: The goal's theta, unwrapped [rad].
+        near: Values of (theta, q...) that the goals of joints without limits are turned to, shape (1 + n,).
+    """
+    joints = zip(problem.tree.joints, problem.goal_joints, near[1:].tolist(), strict=True)
+    turned = (
+        value + nearest_turn(goal - value) if joint.circular and goal is not None else goal
+        for joint, goal, value in joints
+    )
+    return (goal_angle, *turned)
+
+
+def final_intervals(problem: PlanningProblem, values: Sequence[float | None]) -> Bounds:
+    """Intervals of (theta, q...) in which the goal is reached; infinite for joints that are free there.
+
+    Args:
+        problem: What was asked.
+        values: The values there, see ``goal_values``.
+    """
+    goals = (float(problem.goal_pose[2]), *problem.goal_joints)
+    lower, upper = np.full(len(goals), -inf), np.full(len(goals), inf)
+    for axis, ((low, high), goal, value) in enumerate(zip(goal_box(problem), goals, values, strict=True)):
+        if goal is not None and value is not None:
+            spare, turned = 0.5 * (1.0 - GOAL_FRACTION) * (high - low), value - goal
+            lower[axis], upper[axis] = low + spare + turned, high - spare + turned
+    return lower, upper
+
+
+def goal_intervals(problem: PlanningProblem, channel: Channel, index: int) -> Bounds:
+    """Intervals of (theta, q...) to reach in a box: its overlap with the next box or with the goal.
+
+    Raises:
+        PlanError: If they do not overlap; names the box and the axis.
+    """
+    lower, upper = channel.boxes[index].lower.copy(), channel.boxes[index].upper.copy()
+    if index + 1 < len(channel.boxes):
+        following = channel.boxes[index + 1]
+        lower, upper = np.maximum(lower, following.lower), np.minimum(upper, following.upper)
+    else:
+        goals = final_intervals(problem, goal_values(problem, channel.goal_angle, 0.5 * (lower + upper)))
+        lower, upper = np.maximum(lower, goals[0]), np.minimum(upper, goals[1])
+    if not (lower < upper).all():
+        axis = int(np.argmin(lower < upper))
+        other = "the next cell" if index + 1 < len(channel.boxes) else "the goal"
+        raise PlanError(
+            f"cell {index}: on axis {axis} it shares no interval with {other}: the larger lower end "
+            f"{lower[axis]} is not below the smaller upper end {upper[axis]}"
+        )
+    return lower, upper
+
+
+def turned_to_start(problem: PlanningProblem, channel: Channel) -> Channel:
+    """Shift circular axes of all boxes by full turns so that the first one holds the start's angles."""
+    first = channel.boxes[0]
+    turns = np.rint((problem.start[2:] - 0.5 * (first.lower + first.upper)) / tau)
+    shift = np.where(problem.tree.circular, turns * tau, 0.0)
+    boxes = tuple(replace(box, lower=box.lower + shift, upper=box.upper + shift) for box in channel.boxes)
+    path = None if channel.path is None else channel.path + np.concatenate([[0.0, 0.0], shift])
+    return replace(channel, boxes=boxes, goal_angle=channel.goal_angle + shift[0], path=path)
+
+
+def check_ends(problem: PlanningProblem, channel: Channel) -> None:
+    """Refuse a channel whose first box does not hold the start, or whose last one does not hold the goal.
+
+    Raises:
+        PlanError: Names the end and the box.
+    """
+    first, last = channel.boxes[0], channel.boxes[-1]
+    start, goal = problem.start[2:], channel.goal_angle
+    if not first.polygon.contains(Point(problem.start[:2])):
+        raise PlanError("the start's position lies outside the first cell")
+    if not ((first.lower < start) & (start < first.upper)).all():
+        raise PlanError(
+            f"the start's angles {start} lie outside the first cell's [{first.lower}, {first.upper}]"
+        )
+    if not last.polygon.contains(Point(problem.goal_pose[:2])):
+        raise PlanError("the goal's position lies outside the last cell")
+    if not last.lower[0] <= goal <= last.upper[0]:
+        raise PlanError(
+            f"the goal's angle {goal} lies outside the last cell's [{last.lower[0]}, {last.upper[0]}]"
+        )
+
+
+# Targets: points in the overlaps of consecutive cores, chosen such that the estimated time is short.
+
+LARGEST_PARTS = 3
+"""Of an overlap in several parts only this many are considered, those with the largest inscribed disc."""
+
+MOST_CANDIDATES = 4
+"""No overlap adopts targets of others beyond so many [-]: in long aisles all overlaps share theirs, and every
+pair costs a search for a passage."""
+
+SHARED_FRACTION = 0.7
+"""A target serves another overlap too if its clearance there is this fraction of the clearance of that
+overlap's own target [-]."""
+
+
+def targets_of(channel: Channel, start: FloatArray, goal: FloatArray) -> tuple[FloatArray, ...]:
+    """Targets chosen for a short time, or where the path of the boxes leaves them; see ``choose_targets``.
+
+    Overlaps that are a tenth of a millimetre wide may have parts that their boxes do not join.
+    """
+    try:
+        return choose_targets(channel, start, goal)
+    except PlanError:
+        if channel.ends is None:
+            raise
+        return (*channel.ends[:-1], goal)
+
+
+def choose_targets(channel: Channel, start: FloatArray, goal: FloatArray) -> tuple[FloatArray, ...]:
+    """Choose a target for every box: poles of inaccessibility of overlapping cores, the last one the goal.
+
+    An overlap may have several parts, and a target may serve several overlaps in a row, in which case only
+    angles move. The sequence of targets with the shortest estimated time is chosen.
+
+    Args:
+        channel: Boxes whose cores overlap.
+        start: Start position, in the first box, shape (2,) [m].
+        goal: Goal position, in the last box, shape (2,) [m].
+
+    Returns:
+        A point for every box, each of shape (2,) [m].
+
+    Raises:
+        PlanError: If consecutive cores do not overlap, or a box does not join its ends.
+    """
+    layers = [[start], *_candidates(channel.boxes), [goal]]
+    times = np.zeros(1)
+    choices = []
+    for index, box in enumerate(channel.boxes):
+        costs = times[:, None] + _crossing_times(box, layers[index], layers[index + 1])
+        if not np.isfinite(costs).any():
+            raise PlanError(f"cell {index}: its entrance and its exit are not connected inside it")
+        choices.append(np.argmin(costs, axis=0))
+        times = costs.min(axis=0)
+    chosen = [0]
+    for choice in reversed(choices[1:]):
+        chosen.append(int(choice[chosen[-1]]))
+    return tuple(layer[k] for layer, k in zip(layers[1:], reversed(chosen), strict=True))
+
+
+def _crossing_times(box: FreeBox, entries: Sequence[FloatArray], exits: Sequence[FloatArray]) -> FloatArray:
+    """Estimated time from every entry to every exit, infinite without a passage, (entries, exits) [s]."""
+    if len(entries) == 1 and len(exits) == 1:
+        return np.zeros((1, 1))
+    finder = PassageFinder(box.polygon)
+
+    def time(entry: FloatArray, exit_: FloatArray) -> float:
+        try:
+            passage = finder.find(entry, exit_)
+        except GeometryError:
+            return float("inf")
+        return transition_time(passage.length, passage.clearance)
+
+    return np.array([[time(entry, exit_) for exit_ in exits] for entry in entries])
+
+
+def _candidates(boxes: Sequence[FreeBox]) -> list[list[FloatArray]]:
+    """For every overlap its own poles, and the poles of neighbouring overlaps that fit into it."""
+    overlaps = [_parts(first, second, index) for index, (first, second) in enumerate(pairwise(boxes))]
+    own = [[pole(part) for part in parts] for parts in overlaps]
+    layers = [[point for point, _ in poles] for poles in own]
+    for order in (range(1, len(overlaps)), range(len(overlaps) - 2, -1, -1)):
+        before = 1 if order.step == -1 else -1
+        for index in order:
+            _adopt(
+                layers[index],
+                layers[index + before],
+                overlaps[index],
+                [clearance for _, clearance in own[index]],
+            )
+    return layers
+
+
+def _adopt(
+    layer: list[FloatArray],
+    others: Sequence[FloatArray],
+    parts: Sequence[Polygon],
+    clearances: Sequence[float],
+) -> None:
+    """Add points of a neighbouring overlap that have enough clearance in one of the parts, up to a number."""
+    for point in others:
+        known = any(np.array_equal(point, mine) for mine in layer)
+        fits = any(
+            BoundaryDistance(part)(point) >= SHARED_FRACTION * clearance
+            for part, clearance in zip(parts, clearances, strict=True)
+        )
+        if fits and not known and len(layer) < MOST_CANDIDATES:
+            layer.append(point)
+
+
+def _parts(first: FreeBox, second: FreeBox, index: int) -> list[Polygon]:
+    """Parts of the overlap of two cores, those with the largest inscribed disc first."""
+    parts = [part for part in parts_of(first.core.intersection(second.core)) if part.area > 0.0]
+    if not parts:
+        raise PlanError(f"cells {index} and {index + 1}: their cores do not overlap")
+    return sorted(parts, key=lambda part: -pole(part)[1])[:LARGEST_PARTS]
+
+
+# A path through the boxes of a channel that was found without one.
+
+
+def path_through(
+    problem: PlanningProblem, channel: Channel, targets: Sequence[FloatArray] | None = None
+) -> FloatArray:
+    """A path along the widest passages of a channel's boxes; angles move evenly from overlap to overlap.
+
+    Args:
+        problem: What was asked.
+        channel: The boxes, theta turned to the start.
+        targets: Points at which each box is left, the last one the goal; chosen to be quick if not given.
+
+    Returns:
+        Free configurations from start to goal, circular axes unwrapped, shape (m, 3 + n).
+    """
+    if targets is None:
+        targets = choose_targets(channel, problem.start[:2], problem.goal_pose[:2])
+    samples, axes = [problem.start], problem.start[2:]
+    entries = (problem.start[:2], *targets[:-1])
+    for index, (box, entry, target) in enumerate(zip(channel.boxes, entries, targets, strict=True)):
+        lower, upper = goal_intervals(problem, channel, index)
+        aim = 0.5 * (lower + upper)
+        if index + 1 == len(channel.boxes):
+            goals = goal_values(problem, channel.goal_angle, aim)
+            nearest = np.clip(axes, lower, upper)
+            aim = np.array(
+                [near if goal is None else goal for near, goal in zip(nearest, goals, strict=True)]
+            )
+        corners = shapely.get_coordinates(PassageFinder(box.polygon).find(entry, target).path)
+        at = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(corners, axis=0).T))])
+        fractions = at / at[-1] if at[-1] > 0.0 else np.linspace(0.0, 1.0, len(at))
+        turned = axes + fractions[1:, None] * (aim - axes)
+        samples += list(np.hstack((corners[1:], turned)))
+        axes = aim
+    return np.array(samples)
+
 
 DISC_VERTICES = 32
 """Vertices of the last goal region, a polygon inside the disc of the position tolerance."""

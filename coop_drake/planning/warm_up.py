@@ -10,7 +10,7 @@ from coop_drake.geometry.convex import normals
 from coop_drake.geometry.passage import PassageFinder
 from coop_drake.laws import ScheduledGains
 from coop_drake.planning.planner import plan
-from coop_drake.planning.proofs.proof_search import Proofs
+from coop_drake.planning.proofs import Proofs
 from coop_drake.tree.component_tree import Body, Component, ComponentTree, ConvexShape, TreeJoint
 from coop_drake.tree.pose import PlanarPose
 

@@ -58,8 +58,8 @@ class TreeJoint:
       ``tree/levers.py``; ``geometry/sweep_kernels.py`` and ``swept_tree.py`` (over-sweeps),
       ``geometry/under_kernels.py`` (under-sweeps);
     - to the control laws: ``laws/robot_dynamics.py`` (velocities and forces);
-    - to the planner: ``answers/problem.py`` (room beyond limits), ``planning/cells/split_rules.py``
-      (``finest_widths``), ``planning/search/rescaling.py`` and ``diagnosis/team_changes.py``;
+    - to the planner: ``answers/problem.py`` (room beyond limits), ``planning/cells/splitting.py``
+      (``finest_widths``), ``planning/rescaling.py`` and ``diagnosis/team_changes.py``;
     - to the budget of a deployment: ``scenario/budget_file.py`` (errors of velocities);
     - independently of all these to ``checking/team.py``, and in ``verification/`` to ``question.py``,
       ``solids.py``, ``speeds.py`` and ``runs/placement.py``, ``mechanics.py`` and ``speeds.py``.

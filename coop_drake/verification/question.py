@@ -23,7 +23,7 @@ TRUSTED = (
     "(coop_drake/verification/question.py; --question FILE writes it)",
     "how a budget follows from the section deployment and the models (coop_drake/scenario, coop_drake/plant)",
     "the rule by which a plan's gains follow from its cells, which the planner uses too (coop_drake/laws)",
-    "the simulation that estimates times, for limits that refuse a way (coop_drake/planning/execution)",
+    "the simulation that estimates times, for limits that refuse a way (coop_drake/planning/duration.py)",
     "Python's integers, and the checker (coop_drake/checking)",
 )
 """What remains to be trusted when the exact checker accepts an answer."""

@@ -14,7 +14,7 @@ from coop_drake.answers.plan import Plan
 from coop_drake.answers.problem import PlanningProblem
 from coop_drake.errors import RefusalError
 from coop_drake.laws import GainSet, ScheduledGains
-from coop_drake.planning.execution.estimate import estimated
+from coop_drake.planning.duration import estimated
 from coop_drake.tree.pose import FloatArray
 from coop_drake.tree.usual_unit import usual_unit
 from coop_drake.verification.checks import Check

@@ -15,7 +15,7 @@ from coop_drake.drawing import colours
 from coop_drake.drawing.floor import draw_polygon
 from coop_drake.geometry.parts import parts_of
 from coop_drake.geometry.swept_tree import Interval, Intervals
-from coop_drake.planning.cells.cell_graph import Kind
+from coop_drake.planning.cells.graph import Kind
 from coop_drake.tree.pose import FloatArray
 from coop_drake.watching.channel_path import PathPiece
 from coop_drake.watching.floor_panel import draw_piece

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from coop_drake.planning.cells.cell_graph import Kind
 from coop_drake.planning.cells.exploration import Verdict
+from coop_drake.planning.cells.graph import Kind
 from coop_drake.watching.recording import BOXES, SearchRecording
 from coop_drake.watching.search_states import SearchState
 

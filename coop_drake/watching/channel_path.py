@@ -12,7 +12,7 @@ from scipy.sparse.csgraph import dijkstra
 from shapely import Point, Polygon
 
 from coop_drake.geometry.minkowski import to_polygon
-from coop_drake.planning.cells.cell_graph import Kind
+from coop_drake.planning.cells.graph import Kind
 from coop_drake.tree.circles import turns_to
 from coop_drake.tree.pose import FloatArray
 from coop_drake.watching.search_states import ChannelCell

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from coop_drake.planning.cells.cell_graph import Kind
 from coop_drake.planning.cells.cells import Region
+from coop_drake.planning.cells.graph import Kind
 from coop_drake.planning.cells.slices import holds, share_facet
 from coop_drake.tree.pose import FloatArray
 from coop_drake.watching.search_states import Leaf

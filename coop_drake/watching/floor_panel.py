@@ -13,7 +13,7 @@ from matplotlib.patches import PathPatch
 from coop_drake.answers.problem import PlanningProblem
 from coop_drake.drawing import colours
 from coop_drake.drawing.floor import draw_team, draw_workspace, outline_of
-from coop_drake.planning.cells.cell_graph import Kind
+from coop_drake.planning.cells.graph import Kind
 from coop_drake.tree.pose import FloatArray
 from coop_drake.watching.channel_path import PathPiece
 

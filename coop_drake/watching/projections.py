@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 from manifold3d import CrossSection, OpType
 
-from coop_drake.planning.cells.cell_graph import Kind
 from coop_drake.planning.cells.cells import Region
+from coop_drake.planning.cells.graph import Kind
 from coop_drake.watching.search_states import Leaf
 
 _OUTLINE_TOLERANCE = 0.005

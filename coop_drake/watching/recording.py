@@ -10,21 +10,22 @@ from manifold3d import CrossSection, FillRule
 
 from coop_drake.answers.problem import PlanningProblem, at_goal
 from coop_drake.geometry.parts import polygon_rings
-from coop_drake.planning.boxes.channel import Channel
-from coop_drake.planning.cells.cell_graph import Kind
+from coop_drake.planning.cells.as_printed import PaperExploration
 from coop_drake.planning.cells.cells import Region
-from coop_drake.planning.cells.events import (
+from coop_drake.planning.cells.exploration import (
     ChannelSearched,
     Event,
+    Exploration,
     ExplorationBegan,
     ExplorationEnded,
     SeenCell,
     SliceAdded,
+    Verdict,
 )
-from coop_drake.planning.cells.exploration import Exploration, Verdict
-from coop_drake.planning.cells.printed_algorithms import PaperExploration
-from coop_drake.planning.questions.margins import marginal_workspace
-from coop_drake.planning.search.search import find_channel
+from coop_drake.planning.cells.graph import Kind
+from coop_drake.planning.channel import Channel
+from coop_drake.planning.questions import marginal_workspace
+from coop_drake.planning.search import find_channel
 from coop_drake.progress import Progress
 from coop_drake.tree.pose import FloatArray
 

@@ -16,7 +16,7 @@ from coop_drake.drawing import colours
 from coop_drake.drawing.solids import TriangleMesh, extruded_section, joined, tube_mesh
 from coop_drake.files import write_atomically
 from coop_drake.geometry.swept_tree import Interval
-from coop_drake.planning.cells.cell_graph import Kind
+from coop_drake.planning.cells.graph import Kind
 from coop_drake.progress import Progress
 from coop_drake.tree.pose import FloatArray
 from coop_drake.watching.channel_path import PathPiece

@@ -9,9 +9,8 @@ from functools import cached_property
 import numpy as np
 
 from coop_drake.geometry.swept_tree import Intervals
-from coop_drake.planning.cells.cell_graph import Kind
 from coop_drake.planning.cells.cells import Region
-from coop_drake.planning.cells.events import (
+from coop_drake.planning.cells.exploration import (
     ChannelSearched,
     Event,
     ExplorationBegan,
@@ -21,6 +20,7 @@ from coop_drake.planning.cells.events import (
     SliceAdded,
     SliceSplit,
 )
+from coop_drake.planning.cells.graph import Kind
 
 
 @dataclass(frozen=True, eq=False)

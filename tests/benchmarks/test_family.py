@@ -7,8 +7,7 @@ import pytest
 
 from benchmarks.planner.cases import CASES
 from benchmarks.planner.family import corridor_problem, crowd_problem, shelf_floor, shelf_problem
-from coop_drake.planning.sampling.collision_kernels import is_free
-from coop_drake.planning.sampling.obstacle_grid import grid_for_team
+from coop_drake.planning.sampling.collision import grid_for_team, is_free
 from coop_drake.tree.team_arrays import team_arrays
 
 MAKERS = {

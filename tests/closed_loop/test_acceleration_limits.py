@@ -12,10 +12,10 @@ from coop_drake.answers.speeds import peak_speeds
 from coop_drake.compiled_loop import simulate_fused
 from coop_drake.errors import PlanError, RefusalError
 from coop_drake.laws import FixedGains, ScheduledGains
-from coop_drake.planning.execution.acceleration_limits import planned_accelerations
-from coop_drake.planning.execution.estimate import estimated
-from coop_drake.planning.execution.transitions import reschedule
+from coop_drake.planning.duration import estimated
+from coop_drake.planning.limits import planned_accelerations
 from coop_drake.planning.planner import plan as make
+from coop_drake.planning.transitions import reschedule
 from coop_drake.plant import planning_problem, run_setup
 from coop_drake.scenario.limits import RobotLimits
 from coop_drake.simulation import build_maps

@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import pytest
 
-from coop_drake.planning.cells import printed_algorithms as paper
+from coop_drake.planning.cells import as_printed
+from coop_drake.planning.cells.as_printed import PaperExploration
 from coop_drake.planning.cells.exploration import Verdict
-from coop_drake.planning.cells.printed_algorithms import PaperExploration
 from tests.planning.test_search import rod_problem
 
 
@@ -40,7 +40,7 @@ def test_ea2_cells_beside_the_path_lead_the_heuristic_to_the_wrong_slices(monkey
     problem = rod_problem(0.5)
     _, outcome = explored(problem)
     assert outcome.verdict is Verdict.FOUND
-    monkeypatch.setattr(paper, "refine", printed_refine)
+    monkeypatch.setattr(as_printed, "refine", printed_refine)
     stuck, outcome = explored(problem)
     assert outcome.verdict is Verdict.RESOLUTION
     widths = {

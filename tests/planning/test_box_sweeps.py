@@ -7,8 +7,7 @@ from hypothesis import strategies as st
 from coop_drake.geometry.body_pairs import BodyPairs
 from coop_drake.geometry.piece_sweeps import over_piece
 from coop_drake.geometry.swept_tree import SweptTree
-from coop_drake.planning.boxes.box_sweeps import bodies_apart, room_for_sweeps, swept_piece
-from coop_drake.planning.boxes.certify import box_arrays
+from coop_drake.planning.boxes import bodies_apart, box_arrays, room_for_sweeps, swept_piece
 from tests.support.trees import slices_of, trees
 
 SOME = settings(max_examples=25)

@@ -3,9 +3,9 @@
 import pytest
 
 from coop_drake.answers.problem import PlannerSettings
-from coop_drake.planning.boxes.channel import Channel, NoChannel
-from coop_drake.planning.cells.events import ChannelSearched, Event, ExplorationBegan
-from coop_drake.planning.search.search import find_channel
+from coop_drake.planning.cells.exploration import ChannelSearched, Event, ExplorationBegan
+from coop_drake.planning.channel import Channel, NoChannel
+from coop_drake.planning.search import find_channel
 from tests.planning.test_search import rod_problem
 from tests.support.cases import case
 from tests.support.soundness import assert_channel_is_sound

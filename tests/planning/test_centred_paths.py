@@ -7,10 +7,9 @@ import pytest
 
 from coop_drake.geometry.convex import following
 from coop_drake.geometry.parts import polygon_rings
-from coop_drake.planning.sampling.elastic_band_kernels import clearances
-from coop_drake.planning.sampling.narrow_passages import are_free, centred
-from coop_drake.planning.sampling.near_contacts import body_contacts, wall_contacts
-from coop_drake.planning.sampling.obstacle_grid import grid_for_team
+from coop_drake.planning.sampling.band import clearances
+from coop_drake.planning.sampling.collision import grid_for_team
+from coop_drake.planning.sampling.narrow_passages import are_free, body_contacts, centred, wall_contacts
 from coop_drake.tree.team_arrays import team_arrays
 from tests.planning.test_narrow_passages import tilted
 from tests.planning.test_search import rod_problem

@@ -7,13 +7,17 @@ import pytest
 from shapely import Polygon
 
 from coop_drake.errors import GeometryError
-from coop_drake.planning.boxes.channel import Channel, CoveredPath
-from coop_drake.planning.questions.margins import exact_footprint
-from coop_drake.planning.sampling.clear_paths import margins_to_try, moved_from_obstacles
-from coop_drake.planning.sampling.elastic_band import estimated_duration, path_clearance
-from coop_drake.planning.search import sampled_search
-from coop_drake.planning.search.sampled_search import SampledSearch
-from coop_drake.planning.search.search import find_channel, find_path
+from coop_drake.planning import sampled_search
+from coop_drake.planning.channel import Channel, CoveredPath
+from coop_drake.planning.questions import exact_footprint
+from coop_drake.planning.sampled_search import SampledSearch
+from coop_drake.planning.sampling.band import (
+    estimated_duration,
+    margins_to_try,
+    moved_from_obstacles,
+    path_clearance,
+)
+from coop_drake.planning.search import find_channel, find_path
 from tests.planning.test_search import rod_problem
 from tests.support.free_positions import FreePositions
 

@@ -8,11 +8,9 @@ from hypothesis import strategies as st
 from coop_drake.geometry.body_pairs import BodyPairs
 from coop_drake.geometry.parts import polygon_rings
 from coop_drake.geometry.swept_tree import SweptTree
-from coop_drake.planning.boxes.box_kernels import box_clearance
-from coop_drake.planning.boxes.certify import box_arrays
+from coop_drake.planning.boxes import box_arrays, box_clearance
 from coop_drake.planning.cells.cells import CellMaker
-from coop_drake.planning.sampling.collision_kernels import team_clearance
-from coop_drake.planning.sampling.obstacle_grid import FAR, grid_inside, lay_grid
+from coop_drake.planning.sampling.collision import FAR, grid_inside, lay_grid, team_clearance
 from coop_drake.tree.team_arrays import place, team_arrays
 from tests.support.trees import configurations, footprint, room, slices_of, trees
 

@@ -11,9 +11,9 @@ from coop_drake.answers.plan import Found, Infeasible
 from coop_drake.answers.problem import PlannerSettings, PlanningProblem
 from coop_drake.errors import PlanError, RefusalError
 from coop_drake.laws.gains import ScheduledGains
-from coop_drake.planning.boxes.channel import Channel
+from coop_drake.planning.channel import Channel
 from coop_drake.planning.planner import plan
-from coop_drake.planning.search.search import find_channel
+from coop_drake.planning.search import find_channel
 from coop_drake.tree.component_tree import Body, Component, ComponentTree, TreeJoint
 from coop_drake.tree.pose import PlanarPose
 from coop_drake.verification import verify_plan, verify_proof

@@ -9,9 +9,9 @@ from shapely import Polygon, box, union_all
 from coop_drake.answers.plan import BeyondLimits
 from coop_drake.answers.problem import PlannerSettings, PlanningProblem
 from coop_drake.laws import ScheduledGains
-from coop_drake.planning.boxes.channel import Channel
+from coop_drake.planning.channel import Channel
 from coop_drake.planning.planner import plan
-from coop_drake.planning.search.search import find_channel
+from coop_drake.planning.search import find_channel
 from coop_drake.tree.component_tree import Body, Component, ComponentTree, ConvexShape, TreeJoint
 from coop_drake.tree.pose import PlanarPose
 from coop_drake.verification import verify_plan, verify_proof

@@ -10,12 +10,11 @@ from coop_drake.answers import Found
 from coop_drake.answers.plan_file import plan_document
 from coop_drake.errors import StallError
 from coop_drake.laws import ScheduledGains
-from coop_drake.planning.boxes.channel import CoveredPath
-from coop_drake.planning.execution.estimate import plan_time
-from coop_drake.planning.improvement.further_paths import quicker_plans
-from coop_drake.planning.planner import plan
-from coop_drake.planning.search.rescaling import Rescaling
-from coop_drake.planning.search.search import find_path
+from coop_drake.planning.channel import CoveredPath
+from coop_drake.planning.duration import plan_time
+from coop_drake.planning.planner import plan, quicker_plans
+from coop_drake.planning.rescaling import Rescaling
+from coop_drake.planning.search import find_path
 from tests.planning.test_search import rod_problem
 from tests.support.channels import bent_channel
 

@@ -11,7 +11,7 @@ from benchmarks.planner.family import corridor_floor, corridor_problem, shelf_pr
 from coop_drake.answers import Infeasible, PlanningProblem
 from coop_drake.laws import ScheduledGains
 from coop_drake.planning.planner import plan
-from coop_drake.planning.proofs.enclosed_ends import MANY_CORNERS, refuted_at_an_end
+from coop_drake.planning.proofs import MANY_CORNERS, refuted_at_an_end
 from coop_drake.verification import verify_proof
 
 

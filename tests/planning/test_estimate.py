@@ -9,8 +9,7 @@ from shapely import box
 from coop_drake.geometry import BoundaryDistance
 from coop_drake.laws import FixedGains, ScheduledGains, transition_gains
 from coop_drake.planning import make_plan, plan_time
-from coop_drake.planning.execution.estimate import speed_per_clearance, timed
-from coop_drake.planning.travel_time import transition_time, travel_time
+from coop_drake.planning.duration import speed_per_clearance, timed, transition_time, travel_time
 from paper.governor_run import run_governor
 from tests.support.channels import bent_channel
 from tests.support.point_mass import build_fields, carry_out, straight_fields

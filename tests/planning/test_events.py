@@ -1,12 +1,13 @@
-from coop_drake.planning.cells.events import (
+from coop_drake.planning.cells.exploration import (
     ChannelSearched,
     Event,
+    Exploration,
     ExplorationBegan,
     ExplorationEnded,
+    ExplorationResult,
     SliceAdded,
     SliceSplit,
 )
-from coop_drake.planning.cells.exploration import Exploration, ExplorationResult
 from tests.planning.test_search import rod_problem
 
 

@@ -4,10 +4,10 @@ import networkx as nx
 import numpy as np
 import pytest
 
-from coop_drake.planning.boxes.boxes import explored_channel
-from coop_drake.planning.cells.cell_graph import CellGraph, Kind
 from coop_drake.planning.cells.exploration import Exploration, Verdict
-from coop_drake.planning.questions.relaxation import relaxed
+from coop_drake.planning.cells.graph import CellGraph, Kind
+from coop_drake.planning.channel import explored_channel
+from coop_drake.planning.questions import relaxed
 from tests.planning.test_search import rod_problem
 from tests.support.cases import case
 from tests.support.soundness import assert_channel_is_sound

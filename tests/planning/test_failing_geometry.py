@@ -12,7 +12,7 @@ from shapely.errors import GEOSException
 from coop_drake.answers.problem import PlannerSettings
 from coop_drake.geometry.minkowski import SAFE_SIDE, FreeSpace
 from coop_drake.planning.cells.exploration import Exploration, Verdict
-from coop_drake.planning.search.search import NoChannel, find_channel
+from coop_drake.planning.search import NoChannel, find_channel
 from tests.geometry.test_minkowski import as_shapely, exact_difference
 from tests.planning.test_search import rod_problem
 from tests.support.trees import room

@@ -5,7 +5,7 @@ from itertools import combinations
 import numpy as np
 import pytest
 
-from coop_drake.planning.cells.graph_edges import BLOCK, drop, empty_links, link, settle
+from coop_drake.planning.cells.graph import BLOCK, drop, empty_links, link, settle
 
 NODES, GROUP = 90, 3
 

@@ -7,16 +7,14 @@ import pytest
 
 from benchmarks.planner.family import corridor_problem, crowd_problem
 from coop_drake.answers import PlannerSettings
-from coop_drake.planning.boxes.channel import Channel, middle_of
-from coop_drake.planning.questions.margins import marginal_workspace
-from coop_drake.planning.sampling.collision_kernels import is_free
-from coop_drake.planning.sampling.guided_samples import SampledRegion, draw
+from coop_drake.planning.channel import Channel, middle_of
+from coop_drake.planning.questions import marginal_workspace
+from coop_drake.planning.sampled_search import SampledSearch
+from coop_drake.planning.sampling.collision import grid_for_team, is_free
 from coop_drake.planning.sampling.narrow_passages import are_free
-from coop_drake.planning.sampling.obstacle_grid import grid_for_team
-from coop_drake.planning.sampling.sampler import Sampler
-from coop_drake.planning.sampling.subsystems import SubsystemHierarchy
-from coop_drake.planning.search.sampled_search import SampledSearch
-from coop_drake.planning.search.search import find_channel
+from coop_drake.planning.sampling.sampler import Sampler, SubsystemHierarchy
+from coop_drake.planning.sampling.trees import SampledRegion, draw
+from coop_drake.planning.search import find_channel
 from coop_drake.tree.team_arrays import team_arrays
 
 SAMPLES = 400

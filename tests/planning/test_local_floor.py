@@ -13,8 +13,7 @@ from coop_drake.answers.digest import problem_digest
 from coop_drake.errors import PlanError
 from coop_drake.laws import ScheduledGains
 from coop_drake.planning.planner import plan
-from coop_drake.planning.sampling.disc_route import disc_route
-from coop_drake.planning.sampling.local_floor import MANY_CORNERS, local_question
+from coop_drake.planning.sampling.routes import MANY_CORNERS, disc_route, local_question
 from coop_drake.verification import verify_plan
 
 BEND = Polygon([(0, 0), (8, 0), (8, 1), (1, 1), (1, 7), (0, 7)])

@@ -9,6 +9,8 @@ from shapely import Point
 
 from benchmarks.planner.family import corridor_problem
 from coop_drake.planning import Channel, find_channel
+from coop_drake.planning import sampled_search
+from coop_drake.planning.sampled_search import NarrowSearch
 from coop_drake.planning.sampling.narrow_passages import (
     amount_needed,
     are_free,
@@ -16,10 +18,7 @@ from coop_drake.planning.sampling.narrow_passages import (
     repaired,
     widened_floor,
 )
-from coop_drake.planning.sampling.sampler import Sampler
-from coop_drake.planning.sampling.subsystems import SubsystemHierarchy
-from coop_drake.planning.search import narrow_search
-from coop_drake.planning.search.narrow_search import NarrowSearch
+from coop_drake.planning.sampling.sampler import Sampler, SubsystemHierarchy
 from tests.planning.test_search import rod_problem
 from tests.support.cases import transport
 from tests.support.soundness import assert_channel_is_sound
@@ -77,7 +76,7 @@ def test_the_team_is_sampled_only_where_the_object_alone_almost_fits(monkeypatch
         return inner(self, subsystem, *rest)
 
     monkeypatch.setattr(Sampler, "_connect", connect)
-    monkeypatch.setattr(narrow_search, "NARROW_SAMPLES", 4_000)
+    monkeypatch.setattr(sampled_search, "NARROW_SAMPLES", 4_000)
     search = NarrowSearch(problem, SubsystemHierarchy(problem), lambda path, smallest: None)
     tried = search.tries(1, None, object_first=True)[0]()
     assert max(sampled) == sampled_joints

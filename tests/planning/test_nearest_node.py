@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from coop_drake.planning.sampling.nearest_node import add, empty_tree, nearest
+from coop_drake.planning.sampling.trees import add, empty_tree, nearest
 
 LOWER, UPPER = np.array([-1.0, 2.0, -np.pi, -1.5]), np.array([9.0, 6.0, np.pi, 1.5])
 

@@ -9,11 +9,17 @@ import pytest
 from manifold3d import CrossSection
 
 from coop_drake.geometry.swept_tree import Intervals
-from coop_drake.planning.cells.cell_graph import CellGraph, GraphCell, Kind
+from coop_drake.planning.cells.as_printed import PaperExploration, refine
 from coop_drake.planning.cells.cells import Region
-from coop_drake.planning.cells.events import ChannelSearched, Event, SliceAdded, SliceSplit
-from coop_drake.planning.cells.exploration import ExplorationResult, Verdict
-from coop_drake.planning.cells.printed_algorithms import PaperExploration, refine
+from coop_drake.planning.cells.exploration import (
+    ChannelSearched,
+    Event,
+    ExplorationResult,
+    SliceAdded,
+    SliceSplit,
+    Verdict,
+)
+from coop_drake.planning.cells.graph import CellGraph, GraphCell, Kind
 from coop_drake.planning.cells.slices import Slices
 from tests.planning.test_search import rod_problem
 from tests.support.cases import team_tree, transport

@@ -10,15 +10,12 @@ from coop_drake.answers.plan_checks import check_plan
 from coop_drake.laws import FixedGains, ScheduledGains, transition_gains
 from coop_drake.laws.gain_schedule import schedule_of
 from coop_drake.planning import make_plan, plan_time
+from coop_drake.planning.box_choice import cross_box, object_motion, soonest_exit
+from coop_drake.planning.cell_selection import cover_path, quickest_plan
 from coop_drake.planning.cells.cells import CellMaker
-from coop_drake.planning.execution.channel_ends import turned_to_start
-from coop_drake.planning.execution.channel_path import path_through
-from coop_drake.planning.execution.estimate import speed_per_clearance
-from coop_drake.planning.improvement.box_crossing import cross_box
-from coop_drake.planning.improvement.object_motion import object_motion, soonest_exit
-from coop_drake.planning.improvement.path_covering import cover_path
-from coop_drake.planning.improvement.quickest import quickest_plan
-from coop_drake.planning.search.search import find_channel
+from coop_drake.planning.duration import speed_per_clearance
+from coop_drake.planning.search import find_channel
+from coop_drake.planning.transitions import path_through, turned_to_start
 from tests.support.cases import case
 from tests.support.free_positions import FreePositions
 

@@ -9,7 +9,7 @@ from coop_drake.answers import BeyondLimits, Found, Infeasible, SearchReport, Un
 from coop_drake.answers.limits import Refusal
 from coop_drake.laws import ScheduledGains
 from coop_drake.planning import planner
-from coop_drake.planning.boxes.channel import NoChannel
+from coop_drake.planning.channel import NoChannel
 from tests.support.channels import bent_channel
 
 REPORT = SearchReport(10)

@@ -15,7 +15,7 @@ from coop_drake.laws import ScheduledGains
 from coop_drake.laws.nominal import nominal_flow
 from coop_drake.planning.budget.position_fit import UnprovedPosition, commanded_accelerations, fit_position
 from coop_drake.planning.budget.position_tube import PositionGains, position_tubes
-from coop_drake.planning.execution.transitions import with_gains
+from coop_drake.planning.transitions import with_gains
 from coop_drake.plant import planning_problem
 from tests.support.small_loop import small_problem
 from tests.support.tubes import BUDGET, tubed_problem

@@ -8,12 +8,10 @@ from shapely import Point, Polygon, box
 
 from benchmarks.planner.family import corridor_problem
 from coop_drake.answers.problem import PlanningProblem
+from coop_drake.planning.blocked_goal import blocked_goal
 from coop_drake.planning.cells.exploration import Exploration, Verdict
-from coop_drake.planning.proofs.blocked_goals import blocked_goal
-from coop_drake.planning.proofs.clearance_bound import clearance_bound
-from coop_drake.planning.proofs.inscribed_disc import disc_refuted
-from coop_drake.planning.proofs.proof_search import Proofs
-from coop_drake.planning.questions.relaxation import inscribed_disc, relaxed
+from coop_drake.planning.proofs import Proofs, clearance_bound, disc_refuted
+from coop_drake.planning.questions import inscribed_disc, relaxed
 from coop_drake.tree.component_tree import Body, Component, ComponentTree, ConvexShape, TreeJoint
 from coop_drake.tree.pose import PlanarPose
 from tests.planning.test_search import rod_problem

@@ -10,10 +10,10 @@ from coop_drake.answers.plan import BeyondLimits, Found
 from coop_drake.answers.problem import LIMIT_ROOM, PlanningProblem
 from coop_drake.errors import PlanError
 from coop_drake.laws import ScheduledGains
-from coop_drake.planning.boxes.channel import Channel, NoChannel
-from coop_drake.planning.execution.estimate import timed
+from coop_drake.planning.channel import Channel, NoChannel
+from coop_drake.planning.duration import timed
 from coop_drake.planning.planner import plan
-from coop_drake.planning.search.search import find_channel
+from coop_drake.planning.search import find_channel
 from coop_drake.tree.component_tree import Body, Component, ComponentTree, TreeJoint
 from coop_drake.tree.pose import PlanarPose
 from coop_drake.verification import verify_plan, verify_proof

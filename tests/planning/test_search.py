@@ -5,8 +5,8 @@ import pytest
 from shapely import Polygon, box, union_all
 
 from coop_drake.answers.problem import PlannerSettings, PlanningProblem
-from coop_drake.planning.boxes.channel import Channel, NoChannel
-from coop_drake.planning.search.search import find_channel
+from coop_drake.planning.channel import Channel, NoChannel
+from coop_drake.planning.search import find_channel
 from coop_drake.tree.component_tree import Body, Component, ComponentTree, TreeJoint
 from coop_drake.tree.pose import PlanarPose
 from tests.support.cases import case, rectangle, transport

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from coop_drake.planning.execution.speed_shares import fill
+from coop_drake.planning.limits import fill
 
 
 @settings(max_examples=100)

@@ -8,9 +8,9 @@ import pytest
 from benchmarks.adversaries.crossings import discs_in_a_corridor
 from benchmarks.planner.family import corridor_problem
 from coop_drake.planning import find_channel
+from coop_drake.planning.cells.cells import Squeezes
 from coop_drake.planning.cells.exploration import Exploration, Verdict
-from coop_drake.planning.cells.squeezes import Squeezes
-from coop_drake.planning.questions.relaxation import relaxed
+from coop_drake.planning.questions import relaxed
 from coop_drake.tree.component_tree import ComponentTree
 from coop_drake.verification import verify_proof
 from tests.support.free_positions import FreePositions

@@ -6,8 +6,8 @@ import shapely
 from shapely import LineString, MultiPolygon, Point, Polygon, box
 
 from coop_drake.geometry.parts import polygon_rings
-from coop_drake.planning.questions.floor_near import nearby
-from coop_drake.planning.sampling.obstacle_grid import ObstacleGrid, lay_grid, square_at
+from coop_drake.planning.questions import nearby
+from coop_drake.planning.sampling.collision import ObstacleGrid, lay_grid, square_at
 from tests.support.cases import warehouse
 from tests.support.trees import room
 

@@ -21,9 +21,8 @@ from coop_drake.geometry.boundary import edges_of
 from coop_drake.laws import ScheduledGains
 from coop_drake.laws.axis_table import axis_table
 from coop_drake.laws.gain_schedule import schedule_of
-from coop_drake.planning.execution.transport_kernels import cross_cell
-from coop_drake.planning.improvement.box_crossing import cross_box
-from coop_drake.planning.improvement.object_motion import object_motion
+from coop_drake.planning.box_crossing import cross_box, object_motion
+from coop_drake.planning.duration import cross_cell
 from coop_drake.plant import set_configuration
 from coop_drake.scenario import Deployment
 from coop_drake.simulation.stall import blocking_margin

@@ -9,7 +9,7 @@ import numpy as np
 from coop_drake.answers.digest import problem_digest
 from coop_drake.answers.plan import Plan
 from coop_drake.answers.problem import PlanningProblem
-from coop_drake.planning.execution.estimate import timed
+from coop_drake.planning.duration import timed
 
 
 def last_cells(plan: Plan, problem: PlanningProblem, count: int) -> tuple[Plan, PlanningProblem]:

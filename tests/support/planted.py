@@ -12,7 +12,7 @@ from shapely import Polygon
 from shapely.geometry.base import BaseGeometry
 
 from coop_drake.answers.problem import PlannerSettings, PlanningProblem
-from coop_drake.planning.sampling.densify import densified
+from coop_drake.planning.sampling.collision import densified
 from coop_drake.tree.component_tree import ComponentTree
 from coop_drake.tree.levers import configuration_scale
 from tests.support.free_positions import FreePositions

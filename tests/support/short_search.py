@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import pytest
 
-from coop_drake.planning.search import attempt, narrow_search, search
+from coop_drake.planning import sampled_search, search
 
 
 def sample_little(monkeypatch: pytest.MonkeyPatch) -> None:
     """Let a search sample a hundredth as much, and try two narrow passages and one path in their middle."""
     monkeypatch.setattr(search, "NARROW_ATTEMPTS", 2)
-    monkeypatch.setattr(narrow_search, "CENTRED_PATHS", 1)
-    monkeypatch.setattr(narrow_search, "NARROW_SAMPLES", 100)
-    for name in ("SAMPLES", "MANY_SAMPLES"):
-        monkeypatch.setattr(attempt, name, 100)
+    monkeypatch.setattr(sampled_search, "CENTRED_PATHS", 1)
+    monkeypatch.setattr(sampled_search, "NARROW_SAMPLES", 100)
+    for name in ("FEW_SAMPLES", "MANY_SAMPLES"):
+        monkeypatch.setattr(sampled_search, name, 100)

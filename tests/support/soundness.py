@@ -7,8 +7,8 @@ import shapely
 from shapely import Point, maximum_inscribed_circle
 
 from coop_drake.answers.problem import PlanningProblem
-from coop_drake.planning.boxes.channel import Channel, FreeBox
-from coop_drake.planning.execution.channel_ends import goal_values
+from coop_drake.planning.channel import Channel, FreeBox
+from coop_drake.planning.transitions import goal_values
 from tests.support.free_positions import FreePositions
 
 _POSITIONS = 200

@@ -3,8 +3,8 @@
 import pytest
 
 from coop_drake.answers.problem import PlannerSettings
-from coop_drake.planning.boxes.channel import Channel
-from coop_drake.planning.search.search import find_channel
+from coop_drake.planning.channel import Channel
+from coop_drake.planning.search import find_channel
 from tests.support.passages import DiscDoor, FoldingArm, LadderCorner, RodCorridor
 from tests.support.soundness import assert_channel_is_sound
 

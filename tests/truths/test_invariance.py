@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 from pydrake.math import RigidTransform, RotationMatrix
 
 from coop_drake.answers.problem import PlanningProblem
-from coop_drake.planning.boxes.channel import Channel
-from coop_drake.planning.search.search import find_channel
+from coop_drake.planning.channel import Channel
+from coop_drake.planning.search import find_channel
 from coop_drake.plant.planarity import planar_pose
 from coop_drake.tree.circles import nearest_turn
 from coop_drake.tree.component_tree import TreeJoint

@@ -7,8 +7,8 @@ from hypothesis import strategies as st
 from shapely import Polygon
 
 from coop_drake.answers.problem import PlannerSettings, PlanningProblem
-from coop_drake.planning.boxes.channel import Channel
-from coop_drake.planning.search.search import find_channel
+from coop_drake.planning.channel import Channel
+from coop_drake.planning.search import find_channel
 from coop_drake.tree.component_tree import Body, Component, ComponentTree, ConvexShape
 from tests.support.free_positions import FreePositions
 from tests.support.layers import is_joined

@@ -19,8 +19,8 @@ from coop_drake.answers.plan import Plan
 from coop_drake.answers.plan_file import plan_document, read_plan
 from coop_drake.errors import PlanError, RefusalError
 from coop_drake.laws import ScheduledGains
-from coop_drake.planning.execution.transitions import with_gains
 from coop_drake.planning.planner import plan as make
+from coop_drake.planning.transitions import with_gains
 from coop_drake.plant import planning_problem
 from coop_drake.plant.budgets import budget_of, scenario_budgets
 from coop_drake.scenario import Deployment, load_scenario

@@ -11,8 +11,8 @@ from coop_drake.answers.limits import SLOWEST_AGE, Refusal
 from coop_drake.answers.problem import PlanningProblem
 from coop_drake.errors import RefusalError
 from coop_drake.laws import ScheduledGains
-from coop_drake.planning.execution.transitions import reschedule
 from coop_drake.planning.planner import plan
+from coop_drake.planning.transitions import reschedule
 from coop_drake.tree.component_tree import Body, Component, ComponentTree, ConvexShape, TreeJoint
 from coop_drake.tree.pose import PlanarPose
 from coop_drake.verification import verify_plan, verify_proof

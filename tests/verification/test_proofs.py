@@ -16,9 +16,8 @@ from coop_drake.answers.proof_file import read_proof, save_proof
 from coop_drake.errors import PlanError, RefusalError
 from coop_drake.planning import find_channel
 from coop_drake.planning.cells.exploration import Exploration
-from coop_drake.planning.proofs.proof_making import slices_proof
-from coop_drake.planning.proofs.witnesses import Witnesses
-from coop_drake.planning.questions.relaxation import relaxed
+from coop_drake.planning.certificates import Witnesses, slices_proof
+from coop_drake.planning.questions import relaxed
 from coop_drake.tree.component_tree import Body, Component, ComponentTree, ConvexShape
 from coop_drake.verification import verify_file, verify_proof
 from tests.support.certificates import (

@@ -6,16 +6,16 @@ from itertools import pairwise
 
 import pytest
 
-from coop_drake.planning.cells.cell_graph import Kind
-from coop_drake.planning.cells.events import (
+from coop_drake.planning.cells.exploration import (
     ChannelSearched,
+    Exploration,
     ExplorationBegan,
     ExplorationEnded,
     ExplorationResumed,
     SliceAdded,
     SliceSplit,
 )
-from coop_drake.planning.cells.exploration import Exploration
+from coop_drake.planning.cells.graph import Kind
 from coop_drake.watching import search_states
 from tests.planning.test_search import rod_problem
 from tests.watching.rods import NARROW, WIDE, rod_recording

@@ -8,8 +8,7 @@ import numpy as np
 
 from coop_drake.answers import PlanningProblem
 from coop_drake.compiled import prepared
-from coop_drake.planning.sampling.collision_kernels import is_free
-from coop_drake.planning.sampling.obstacle_grid import grid_for_team
+from coop_drake.planning.sampling.collision import grid_for_team, is_free
 from coop_drake.tree.pose import FloatArray
 
 __all__ = ["free_goals", "prepared_check"]

@@ -7,7 +7,7 @@ from math import inf
 import numpy as np
 
 from coop_drake.compiled import compiled
-from coop_drake.planning.sampling.collision_kernels import bodies_apart
+from coop_drake.planning.sampling.collision import bodies_apart
 from coop_drake.tree.component_tree import ComponentTree
 from coop_drake.tree.pose import FloatArray
 from coop_drake.tree.team_arrays import TeamArrays, place

@@ -9,8 +9,7 @@ import numpy as np
 import shapely
 
 from coop_drake.answers import PlanningProblem
-from coop_drake.planning.sampling.collision_kernels import is_free
-from coop_drake.planning.sampling.obstacle_grid import grid_for_team
+from coop_drake.planning.sampling.collision import grid_for_team, is_free
 from coop_drake.tree.component_tree import ConvexShape
 from coop_drake.tree.levers import configuration_scale
 from coop_drake.tree.pose import FloatArray

@@ -17,8 +17,7 @@ from coop_drake.campaign.questions.settings import QuestionSettings
 from coop_drake.campaign.questions.teams import RandomTeam, random_count, random_team
 from coop_drake.errors import CoopDrakeError, ScenarioError
 from coop_drake.files import write_atomically
-from coop_drake.planning.sampling.collision_kernels import is_free
-from coop_drake.planning.sampling.obstacle_grid import grid_for_team
+from coop_drake.planning.sampling.collision import grid_for_team, is_free
 from coop_drake.plant import planning_problem
 from coop_drake.scenario import Goal, ObjectPose, Scenario, Start, Workspace, dump_scenario, load_scenario
 from coop_drake.scenario.directive import DirectiveEntry

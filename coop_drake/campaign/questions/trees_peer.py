@@ -15,7 +15,7 @@ from coop_drake.answers import PlanningProblem
 from coop_drake.campaign.questions.footprint import free_goals, prepared_check
 from coop_drake.campaign.questions.peer import GOALS, MOTION_STEP, RANGE, PeerRun
 from coop_drake.campaign.questions.tree_kernels import rrt_connect
-from coop_drake.planning.sampling.obstacle_grid import grid_for_team
+from coop_drake.planning.sampling.collision import grid_for_team
 from coop_drake.tree.levers import configuration_scale
 
 __all__ = ["CHECKS", "run_trees"]

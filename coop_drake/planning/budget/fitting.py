@@ -22,7 +22,7 @@ from coop_drake.planning.budget.transitions import (
     UnprovedTransition,
     follow_transitions,
 )
-from coop_drake.planning.execution.transitions import share_speeds, with_gains
+from coop_drake.planning.transitions import share_speeds, with_gains
 from coop_drake.tree.pose import FloatArray
 
 AGE_FACTORS = (1.0, 1.25, 1.6, 2.0, 2.3, 2.6, 3.0)

@@ -29,8 +29,8 @@ from coop_drake.geometry.tidy import tidy_cell
 from coop_drake.laws import ScheduledGains
 from coop_drake.planning.budget.alarms import alarms_of, position_room
 from coop_drake.planning.budget.position_tube import PositionGains, position_tubes
-from coop_drake.planning.execution.estimate import plan_time, timed
-from coop_drake.planning.execution.transitions import find_route
+from coop_drake.planning.duration import plan_time, timed
+from coop_drake.planning.transitions import find_route
 from coop_drake.tree.pose import FloatArray
 
 SPEEDS = (2.0, 1.6, 1.3, 1.0, 0.7, 0.5, 0.35, 0.2)

@@ -13,7 +13,6 @@ from coop_drake.answers.plan import Plan
 from coop_drake.answers.problem import PlanningProblem
 from coop_drake.errors import GeometryError, PlanError, StallError
 from coop_drake.laws import ScheduledGains
-from coop_drake.planning.boxes.channel import Channel, CoveredPath
 from coop_drake.planning.budget.coupling import TeamCouplings, team_couplings
 from coop_drake.planning.budget.fitting import fit_budget
 from coop_drake.planning.budget.position_fit import (
@@ -24,8 +23,9 @@ from coop_drake.planning.budget.position_fit import (
 )
 from coop_drake.planning.budget.restarting import position_may_rest
 from coop_drake.planning.budget.transitions import UnprovedTransition
-from coop_drake.planning.execution.estimate import plan_time
-from coop_drake.planning.improvement.quickest import quickest_plan
+from coop_drake.planning.cell_selection import quickest_plan
+from coop_drake.planning.channel import Channel, CoveredPath
+from coop_drake.planning.duration import plan_time
 from coop_drake.progress import Progress
 
 SHARE_STEP = 0.01

@@ -7,10 +7,9 @@ from collections.abc import Sequence
 from shapely import MultiPolygon, Polygon
 
 from coop_drake.answers.problem import PlanningProblem
-from coop_drake.planning.cells.cell_graph import CellGraph, GraphCell, Kind
 from coop_drake.planning.cells.cells import Region
-from coop_drake.planning.cells.events import SliceSplit, Watch
-from coop_drake.planning.cells.exploration import ExplorationResult, Subdivision, Verdict
+from coop_drake.planning.cells.exploration import ExplorationResult, SliceSplit, Subdivision, Verdict, Watch
+from coop_drake.planning.cells.graph import CellGraph, GraphCell, Kind
 from coop_drake.tree.pose import FloatArray
 
 End = tuple[list[float | None], FloatArray]

@@ -15,23 +15,116 @@ from coop_drake.answers.problem import PlanningProblem, goal_box
 from coop_drake.geometry.body_pairs import BodyPairs
 from coop_drake.geometry.minkowski import to_polygon
 from coop_drake.geometry.swept_tree import Intervals, SweptTree
-from coop_drake.planning.cells.cell_graph import CellGraph, GraphCell, Kind
-from coop_drake.planning.cells.cells import CellMaker, Region
-from coop_drake.planning.cells.ends import end_in
-from coop_drake.planning.cells.events import (
-    ChannelSearched,
-    Event,
-    ExplorationBegan,
-    ExplorationEnded,
-    ExplorationResumed,
-    SliceAdded,
-    SliceSplit,
-    Watch,
-    seen,
-)
+from coop_drake.planning.cells.cells import CellMaker, Region, end_in
+from coop_drake.planning.cells.graph import CellGraph, GraphCell, Kind
 from coop_drake.planning.cells.slices import Slices, holds, meets
-from coop_drake.planning.cells.split_rules import SplitOrder, finest_widths
-from coop_drake.planning.travel_time import SETTLING_TIME
+from coop_drake.planning.cells.splitting import SplitOrder, finest_widths
+from coop_drake.planning.duration import SETTLING_TIME
+
+# Events of an exploration, one for each step, for displays of the search.
+
+
+@dataclass(frozen=True, eq=False)
+class SeenCell:
+    """A cell of the graph, as events show it.
+
+    Attributes:
+        slice: Id of its slice.
+        kind: What is known about it.
+        region: Positions p_WL.
+    """
+
+    slice: int
+    kind: Kind
+    region: Region
+
+
+@dataclass(frozen=True, eq=False)
+class ExplorationBegan:
+    """A question is explored from its coarsest slices on.
+
+    Attributes:
+        question: What is explored, in words: the whole team or a part of it.
+        robots: Robots that take part.
+    """
+
+    question: str
+    robots: tuple[int, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class ExplorationResumed:
+    """An exploration continues after other explorations had their turn.
+
+    Attributes:
+        question: What is explored, as in ``ExplorationBegan``.
+    """
+
+    question: str
+
+
+@dataclass(frozen=True, eq=False)
+class SliceAdded:
+    """A new leaf of the subdivision.
+
+    Attributes:
+        slice: Its id.
+        intervals: Nominal interval of every axis (theta, q...) [rad, m].
+        cells: Its cells, ordered FREE, GUIDE, MIXED; empty where the whole slice is blocked.
+    """
+
+    slice: int
+    intervals: Intervals
+    cells: tuple[SeenCell, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class SliceSplit:
+    """A leaf is halved; two events ``SliceAdded`` for its halves follow.
+
+    Attributes:
+        slice: Its id.
+        axis: Which axis of (theta, q...) is halved.
+    """
+
+    slice: int
+    axis: int
+
+
+@dataclass(frozen=True, eq=False)
+class ChannelSearched:
+    """The cheapest path of cells from start to goal was searched.
+
+    Attributes:
+        cells: The path; empty if none exists, which proves infeasibility.
+        cost: Its total weight, 0 for an empty path.
+    """
+
+    cells: tuple[SeenCell, ...]
+    cost: float
+
+
+@dataclass(frozen=True, eq=False)
+class ExplorationEnded:
+    """A run of the exploration stopped.
+
+    Attributes:
+        verdict: Value of its ``Verdict``; after "budget spent" the exploration may be resumed.
+        slices: Compound slices made so far.
+    """
+
+    verdict: str
+    slices: int
+
+
+Event = ExplorationBegan | ExplorationResumed | SliceAdded | SliceSplit | ChannelSearched | ExplorationEnded
+Watch = Callable[[Event], None]
+
+
+def seen(cells: Sequence[GraphCell]) -> tuple[SeenCell, ...]:
+    """Cells of the graph, as events show them."""
+    return tuple(SeenCell(cell.slice, cell.kind, cell.region) for cell in cells)
+
 
 TIME_PER_INVERSE_BREADTH = 0.03
 """Weight of a FREE cell for its narrowness, times its breadth (area over perimeter) [s m]."""

@@ -1,23 +1,149 @@
-"""Incremental Dijkstra search on a graph that changes, compiled, with lazy tests of edges.
-
-An edge is tested only when a cheaper way would use it: a test takes longer than many steps of the search.
-When nodes are removed, only the costs of ways through them are computed again, as in other incremental
-searches; all others are kept. It finds what a new search would: of equally cheap ways to a node the one
-whose last node but one has the least cost, and of these the lowest number.
-"""
+"""The graph of cells: FREE, GUIDE and MIXED ones, joined where slices share a facet and regions meet."""
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from coop_drake.compiled import compiled
-from coop_drake.planning.cells.graph_edges import BLOCK, Links, drop, settle
+from coop_drake.compiled import compiled, prepared
+from coop_drake.planning.cells.cells import Region
+from coop_drake.planning.cells.slices import Slices
 from coop_drake.tree.pose import FloatArray, IntArray
 
-__all__ = ["NO_WAY", "REACHED", "Search", "aim", "empty_search", "forget", "go_on"]
+# Edges of a graph that changes, compiled: those of a node lie beside each other in memory, in blocks.
+#
+# An edge has two entries, one at each of its nodes. A search looks at all entries of a node: where these
+# are near to each other in memory, it takes a quarter less time.
+
+BLOCK = 16
+"""Entries of a block: as many 32-bit numbers as a line of a processor's cache holds."""
+
+
+class Links(NamedTuple):
+    """Nodes and edges, with room for N nodes and B blocks of entries.
+
+    Attributes:
+        weights: Cost of passing through each node, shape (N,).
+        bounds: (x_min, y_min, x_max, y_max) of each node's region, shape (N, 4) [m].
+        head: First block of each node's entries, -1 if there is none, shape (N,).
+        filled: Entries in that block; the node's other blocks are full; shape (N,).
+        following: The next block of the same node, or of the free blocks; -1 after the last; shape (B,).
+        to: The node that an entry leads to, shape (BLOCK B,).
+        mate: The other entry of the same edge, shape (BLOCK B,).
+        joined: 1 where the regions of an edge's nodes meet, 0 if that is untested, shape (BLOCK B,).
+        state: The first free block, -1 if there is none, and how many blocks were ever used, shape (2,).
+    """
+
+    weights: FloatArray
+    bounds: FloatArray
+    head: IntArray
+    filled: IntArray
+    following: IntArray
+    to: NDArray[np.int32]
+    mate: NDArray[np.int32]
+    joined: NDArray[np.int8]
+    state: IntArray
+
+
+def empty_links(nodes: int, blocks: int) -> Links:
+    """Arrays for so many nodes and blocks."""
+    to, mate = (np.zeros(blocks * BLOCK, np.int32) for _ in range(2))
+    head, filled, following = np.full(nodes, -1), np.zeros(nodes, np.int64), np.full(blocks, -1)
+    joined, state = np.zeros(blocks * BLOCK, np.int8), np.array([-1, 0])
+    return Links(np.zeros(nodes), np.zeros((nodes, 4)), head, filled, following, to, mate, joined, state)
+
+
+@compiled
+def _append(links: Links, node: int, other: int) -> int:
+    """Append an untested entry to those of a node; returns where."""
+    block = links.head[node]
+    if block < 0 or links.filled[node] == BLOCK:
+        block = links.state[0]
+        if block >= 0:
+            links.state[0] = links.following[block]
+        else:
+            block = links.state[1]
+            links.state[1] += 1
+        links.following[block], links.head[node], links.filled[node] = links.head[node], block, 0
+    entry = int(BLOCK * block + links.filled[node])
+    links.to[entry], links.joined[entry] = other, 0
+    links.filled[node] += 1
+    return entry
+
+
+@compiled
+def _remove(links: Links, node: int, entry: int) -> None:
+    """Remove an entry of a node; the last one of its first block comes to its place."""
+    block = links.head[node]
+    links.filled[node] -= 1
+    last = BLOCK * block + links.filled[node]
+    if last != entry:
+        mate = links.mate[last]
+        links.to[entry], links.mate[entry] = links.to[last], mate
+        links.joined[entry], links.mate[mate] = links.joined[last], entry
+    if links.filled[node] == 0:
+        links.head[node], links.filled[node] = links.following[block], BLOCK
+        links.following[block], links.state[0] = links.state[0], block
+
+
+@compiled
+def drop(links: Links, node: int, entry: int) -> None:
+    """Remove an edge that a node has an entry of."""
+    _remove(links, links.to[entry], links.mate[entry])
+    _remove(links, node, entry)
+
+
+@compiled
+def link(links: Links, first: int, last: int, others: IntArray) -> None:
+    """Join nodes to those of some ranges whose bounds meet theirs, by untested edges.
+
+    Args:
+        links: The graph, with room for the edges.
+        first: The first node.
+        last: The node after the last one.
+        others: Ranges of nodes, each its first and the one after its last, shape (R, 2).
+    """
+    for node in range(first, last):
+        west, south, east, north = links.bounds[node]
+        for row in range(len(others)):
+            for other in range(others[row, 0], others[row, 1]):
+                its = links.bounds[other]
+                if its[0] > east or its[2] < west or its[1] > north or its[3] < south:
+                    continue
+                here, there = _append(links, node, other), _append(links, other, node)
+                links.mate[here], links.mate[there] = there, here
+
+
+@compiled
+def settle(links: Links, node: int, entries: IntArray, meet: NDArray[np.bool_]) -> None:
+    """Note which of some edges of a node join regions that meet, and remove the others.
+
+    Args:
+        links: The graph.
+        node: The node.
+        entries: Its entries, block by block, of every block the last one first, shape (k,): entries that
+            move to the places of removed ones have then been looked at.
+        meet: Whether the regions meet, shape (k,) or longer.
+    """
+    for k in range(len(entries)):
+        entry = entries[k]
+        if meet[k]:
+            links.joined[entry] = links.joined[links.mate[entry]] = 1
+        else:
+            drop(links, node, entry)
+
+
+# Incremental Dijkstra search on a graph that changes, compiled, with lazy tests of edges.
+#
+# An edge is tested only when a cheaper way would use it: a test takes longer than many steps of the search.
+# When nodes are removed, only the costs of ways through them are computed again, as in other incremental
+# searches; all others are kept. It finds what a new search would: of equally cheap ways to a node the one
+# whose last node but one has the least cost, and of these the lowest number.
 
 REACHED, NO_WAY = -1, -2
 """How a search ends: at a goal, or with nothing left to search."""
@@ -259,3 +385,133 @@ def go_on(links: Links, search: Search) -> int:
             return int(search.state[2])
         search.state[1] = -1
     return NO_WAY
+
+
+class Kind(IntEnum):
+    """What is known about a cell."""
+
+    FREE = 0
+    """An under-cell: all of it is free."""
+    GUIDE = 1
+    """The free region of a slice's middle configuration: a hint."""
+    MIXED = 2
+    """An over-cell: nothing outside it is free."""
+
+
+@dataclass(eq=False)
+class GraphCell:
+    """A node of the graph: a region of positions over a slice.
+
+    Attributes:
+        index: Its number in the graph.
+        slice: Id of its slice.
+        kind: What is known about it.
+        region: Positions p_WL.
+        weight: Cost of passing through it.
+    """
+
+    index: int
+    slice: int
+    kind: Kind
+    region: Region
+    weight: float
+
+
+class CellGraph:
+    """Cells by slice; edges are tested when a search first needs them.
+
+    Args:
+        slices: The subdivision that the cells belong to.
+    """
+
+    def __init__(self, slices: Slices) -> None:
+        self._slices = slices
+        self.cells: list[GraphCell] = []
+        self.by_slice: dict[int, list[GraphCell]] = {}
+        self._links, self._search = empty_links(0, 0), empty_search(0)
+        self._go_on = prepared(go_on, (self._links, self._search))
+        self._searched, self._starts = 0, set[int]()
+
+    def add(self, index: int, members: Sequence[tuple[Kind, Region, float]]) -> None:
+        """Put the cells (kind, region, weight) of a new leaf into the graph."""
+        first = len(self.cells)
+        made = [
+            GraphCell(first + i, index, kind, region, weight)
+            for i, (kind, region, weight) in enumerate(members)
+        ]
+        self.cells += made
+        self.by_slice[index] = made
+        if not made:
+            return
+        beside = [self.by_slice.get(other, ()) for other in sorted(self._slices.all[index].neighbours)]
+        ranges = np.array([(its[0].index, its[-1].index + 1) for its in beside if its], dtype=np.int64)
+        others, last = ranges.reshape(-1, 2), len(self.cells)
+        self._make_room(last, len(made), int((others[:, 1] - others[:, 0]).sum()))
+        self._links.weights[first:last] = [cell.weight for cell in made]
+        self._links.bounds[first:last] = [cell.region.bounds for cell in made]
+        link(self._links, first, last, others)
+
+    def remove(self, index: int) -> None:
+        """Remove the cells of a slice that is about to be halved."""
+        if removed := self.by_slice.pop(index):
+            first, last = removed[0].index, removed[-1].index + 1
+            self._starts.difference_update(range(first, last))
+            forget(self._links, self._search, first, last)
+
+    def _make_room(self, nodes: int, new: int, others: int) -> None:
+        """Let the arrays grow, to twice what is needed, where they are too small for new nodes and edges.
+
+        Args:
+            nodes: All nodes, the new ones included.
+            new: New nodes.
+            others: Nodes that each of these may meet.
+        """
+        links, room, stored = self._links, len(self._links.weights), len(self._links.following)
+        blocks = int(links.state[1]) + new + others + 2 * (new * others // BLOCK)
+        if nodes > room or blocks > stored:
+            room = room if nodes <= room else 2 * nodes
+            before: list[NDArray[Any]] = [*links, *self._search]
+            self._search = empty_search(room)
+            self._links = empty_links(room, stored if blocks <= stored else 2 * blocks)
+            grown: list[NDArray[Any]] = [*self._links, *self._search]
+            for larger, old in zip(grown, before, strict=True):
+                larger[: len(old)] = old
+            self._go_on = prepared(go_on, (self._links, self._search))
+
+    def cheapest(self, starts: Sequence[GraphCell], goals: set[int]) -> list[GraphCell] | None:
+        """Path of least total weight by Dijkstra's algorithm; of equal costs the lower index comes first.
+
+        Args:
+            starts: Cells that hold the start.
+            goals: Indices of the cells that hold the goal.
+
+        Returns:
+            Cells from a start to a goal, or None if no path joins them.
+        """
+        begins = {cell.index for cell in starts}
+        if not self._starts <= begins:
+            self._search, self._searched = empty_search(len(self._links.weights)), 0
+            self._go_on = prepared(go_on, (self._links, self._search))
+        links, search = self._links, self._search
+        first, last = (np.array(sorted(ends), dtype=np.int64) for ends in (begins, goals))
+        aim(links, search, self._searched, first, last, len(self.cells))
+        self._searched, self._starts = len(self.cells), begins
+        while (asked := self._go_on()) not in (REACHED, NO_WAY):
+            node, others = int(search.state[1]), links.to[search.asked[:asked]].tolist()
+            search.meet[:asked] = [self._meet(node, other) for other in others]
+        return None if asked == NO_WAY else self._trace(int(search.state[1]))
+
+    def _meet(self, one: int, other: int) -> bool:
+        """Whether the regions of two cells meet.
+
+        If geometry fails, cells count as joined, so that nothing is called blocked wrongly; two FREE cells
+        count as apart, because a path of FREE cells is a proof.
+        """
+        a, b = self.cells[one], self.cells[other]
+        return a.region.meets(b.region, otherwise=(a.kind, b.kind) != (Kind.FREE, Kind.FREE))
+
+    def _trace(self, index: int) -> list[GraphCell]:
+        path = [index]
+        while (before := int(self._search.back[path[-1]])) >= 0:
+            path.append(before)
+        return [self.cells[i] for i in reversed(path)]

@@ -1,16 +1,281 @@
-"""Paths with clearance: the best of some candidates, moved away from the walls and then straightened."""
+"""Elastic bands: a path becomes shorter and moves away from the walls, so that long boxes fit."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from itertools import takewhile
 
+import numpy as np
+
 from coop_drake.answers.problem import PlanningProblem
-from coop_drake.planning.questions.margins import SMALLEST_MARGIN, marginal_workspace
-from coop_drake.planning.sampling.elastic_band import estimated_duration, path_clearance, smoothed
-from coop_drake.planning.sampling.sampler import FEW_JOINTS, Sampler
-from coop_drake.planning.sampling.subsystems import SubsystemHierarchy
+from coop_drake.compiled import compiled
+from coop_drake.planning.questions import SMALLEST_MARGIN, marginal_workspace
+from coop_drake.planning.sampling.collision import (
+    FAR,
+    ObstacleGrid,
+    bodies_apart,
+    densified,
+    grid_for_team,
+    team_clearance,
+)
+from coop_drake.planning.sampling.sampler import (
+    FEW_JOINTS,
+    JOINT_RATE,
+    SPEED,
+    TURN_RATE,
+    Sampler,
+    SubsystemHierarchy,
+)
+from coop_drake.tree.component_tree import ComponentTree
+from coop_drake.tree.levers import configuration_scale
 from coop_drake.tree.pose import FloatArray
+from coop_drake.tree.team_arrays import TeamArrays, place
+
+# Compiled elastic-band smoothing: paths become shorter in every axis and move away from obstacles.
+
+STRIDES = (7, 3, 5, 1, 6, 2, 4, 0)
+"""Order in which the samples of a move are checked, each offset with every eighth sample after it."""
+
+
+@compiled
+def _price(team: TeamArrays, grid: ObstacleGrid, z: FloatArray, gap: float, rate: FloatArray) -> float:
+    """Cost of a sample: rate[0] / (rate[1] + min(clearance, rate[2])), infinite where it is not free."""
+    poses = place(team, z)
+    clearance = team_clearance(team, grid, poses, rate[2])
+    if clearance <= 0.0 or not bodies_apart(team, poses, gap):
+        return np.inf
+    price: float = rate[0] / (rate[1] + clearance)
+    return price
+
+
+@compiled
+def improve(
+    team: TeamArrays,
+    grid: ObstacleGrid,
+    rate: FloatArray,
+    path: FloatArray,
+    lower: FloatArray,
+    upper: FloatArray,
+    scale: FloatArray,
+    weights: FloatArray,
+    gap: float,
+    free_end: bool,
+    uniforms: FloatArray,
+) -> FloatArray:
+    """Lower the cost of a path move by move: bumps and straightenings of one axis over a window.
+
+    The cost is the length in the sum of all weighted axes plus a price for every sample by its clearance.
+
+    Args:
+        team: The team.
+        grid: The floor that the path stays on.
+        rate: A sample with clearance c costs rate[0] / (rate[1] + min(c, rate[2])).
+        path: Samples, close together, shape (m, d).
+        lower: Lower limits, shape (d,); minus infinity where there is none.
+        upper: Upper limits, shape (d,).
+        scale: How far a unit of each axis moves the team, shape (d,).
+        weights: What a unit of each axis costs, shape (d,).
+        gap: Distance that pairs of bodies must keep [m].
+        free_end: Whether the joints of the last sample may move.
+        uniforms: Random numbers in [0, 1), one row for each move, shape (k, 5).
+    """
+    path = path.copy()
+    count, size = path.shape
+    cost = np.empty(count)
+    least = rate[0] / (rate[1] + rate[2])
+    for k in range(count):
+        cost[k] = _price(team, grid, path[k], gap, rate)
+    fresh = np.empty((count, size))
+    fresh_cost = np.empty(count)
+    for row in range(len(uniforms)):
+        u = uniforms[row]
+        axis = int(u[0] * size)
+        half = 1 << int(u[1] * 7.0)
+        middle = 1 + int(u[2] * (count - 1))
+        last_free = free_end and axis > 2
+        i = max(0, middle - half)
+        j = min(count if last_free else count - 1, middle + half)
+        if j - i < 2:
+            continue
+        straight = u[3] < 0.5
+        shift = (2.0 * u[4] - 1.0) * 0.3 / scale[axis]
+        change = 0.0
+        for k in range(i + 1, j):
+            fraction = (k - i) / (j - i)
+            value = path[k, axis]
+            if straight:
+                end = path[j, axis] if j < count else path[i, axis]
+                value = path[i, axis] + fraction * (end - path[i, axis])
+            elif j == count:
+                value += shift * min(1.0, 2.0 * fraction)
+            else:
+                value += shift * min(1.0, 3.0 * min(fraction, 1.0 - fraction))
+            for other in range(size):
+                fresh[k, other] = path[k, other]
+            fresh[k, axis] = min(upper[axis], max(lower[axis], value))
+            change += weights[axis] * abs(
+                fresh[k, axis] - (path[k - 1, axis] if k == i + 1 else fresh[k - 1, axis])
+            )
+            change -= weights[axis] * abs(path[k, axis] - path[k - 1, axis])
+        if j < count:
+            change += weights[axis] * (
+                abs(path[j, axis] - fresh[j - 1, axis]) - abs(path[j, axis] - path[j - 1, axis])
+            )
+        for k in range(i + 1, j):
+            change += least - cost[k]
+        # Most moves fail: samples far apart from each other show this soonest.
+        for first in STRIDES:
+            for k in range(i + 1 + first, j, len(STRIDES)):
+                if change >= -1e-9:
+                    break
+                fresh_cost[k] = _price(team, grid, fresh[k], gap, rate)
+                change += fresh_cost[k] - least
+        if change < -1e-9:
+            for k in range(i + 1, j):
+                path[k, axis] = fresh[k, axis]
+                cost[k] = fresh_cost[k]
+    return path
+
+
+@compiled
+def clearances(team: TeamArrays, grid: ObstacleGrid, path: FloatArray, most: float) -> FloatArray:
+    """Distance of the team from the walls at every sample, at most ``most``; -1 where it meets one.
+
+    Args:
+        team: The team.
+        grid: The floor.
+        path: Configurations, shape (m, 3 + n).
+        most: Distances above this one do not matter [m].
+
+    Returns:
+        Distances, shape (m,) [m].
+    """
+    result = np.empty(len(path))
+    for k in range(len(path)):
+        result[k] = team_clearance(team, grid, place(team, path[k]), most)
+    return result
+
+
+# Elastic-band smoothing: a path becomes shorter and moves away from the walls, so that long boxes fit.
+
+CLEARANCE_PRICE = 0.12
+"""Cost of a unit length of the path for its narrowness, times the clearance there [m]."""
+
+CLEARANCE_OFFSET = 0.005
+"""It is added to clearances before they are divided by, so that costs stay finite [m]."""
+
+SPACING = 0.1
+"""Distance between samples of a path in any scaled axis, unless another one is asked for [m]."""
+
+MOVES = 4_000
+"""Changes of a path that are tried, unless another number is asked for."""
+
+NARROWNESS_TIME, DURATION_OFFSET = 0.25, 0.02
+"""Estimated duration of a unit length for its narrowness, times the clearance plus an offset [s], [m]."""
+
+EXEMPT_DISTANCE = 2.0
+"""Samples nearer to the start or goal than this many clearances may have less clearance than others, because
+the start or goal may stand close to a wall [-]."""
+
+
+def smoothed(
+    problem: PlanningProblem,
+    path: FloatArray,
+    clearance: float,
+    margin: float,
+    gap: float,
+    spacing: float = SPACING,
+    moves: int = MOVES,
+    price: float = CLEARANCE_PRICE,
+) -> FloatArray:
+    """Make a path shorter and move it away from the walls.
+
+    Start and goal stay, but joints that are free at the goal may end elsewhere.
+
+    Args:
+        problem: The question.
+        path: Configurations that keep the clearance, circular axes unwrapped, shape (m, 3 + n).
+        clearance: Distance from the walls that the path keeps before and after [m].
+        margin: Margin that the boxes must keep; only clearance above it makes them wide [m].
+        gap: Distance that pairs of bodies keep [m].
+        spacing: Distance between samples of the path in any scaled axis [m].
+        moves: Changes that are tried.
+        price: Cost of a unit length, times the clearance there; a larger one keeps the path further from
+            the walls [m].
+
+    Returns:
+        The path, shape (k, 3 + n) [m, rad].
+    """
+    tree = problem.tree
+    scale = configuration_scale(tree)
+    team = tree.arrays
+    grid = grid_for_team(marginal_workspace(problem, clearance), team)
+    unbounded = np.full(3, np.inf)
+    better: FloatArray = improve(
+        team,
+        grid,
+        np.array([price * spacing, max(clearance - margin, 0.0) + CLEARANCE_OFFSET, FAR]),
+        densified(path, scale, spacing),
+        np.concatenate((-unbounded, tree.joint_lower)),
+        np.concatenate((unbounded, tree.joint_upper)),
+        scale,
+        _speeds(tree)[0] / _speeds(tree),
+        gap,
+        all(value is None for value in problem.goal_joints),
+        np.random.default_rng(0).random((moves, 5)),
+    )
+    return better
+
+
+def estimated_duration(problem: PlanningProblem, path: FloatArray) -> float:
+    """Rough duration of a transport along a path, to compare candidates [s].
+
+    Args:
+        problem: The question.
+        path: Configurations, circular axes unwrapped, shape (m, 3 + n).
+    """
+    scale, team = configuration_scale(problem.tree), problem.tree.arrays
+    samples = densified(path, scale, SPACING)
+    clear = np.maximum(clearances(team, grid_for_team(problem.workspace, team), samples, FAR), 0.0)
+    moved = np.abs(np.diff(samples, axis=0))
+    shifted = np.hypot(moved[:, 0], moved[:, 1])
+    shortest = np.maximum(shifted / SPEED, (moved[:, 2:] / _speeds(problem.tree)[2:]).max(axis=1))
+    swept = shifted + 0.5 * (moved[:, 2:] * scale[2:]).max(axis=1)
+    return float(
+        (shortest + NARROWNESS_TIME * swept / (np.minimum(clear[1:], clear[:-1]) + DURATION_OFFSET)).sum()
+    )
+
+
+def path_clearance(problem: PlanningProblem, path: FloatArray, most: float) -> float:
+    """Smallest clearance of a path's samples, without those near an end that stands close to a wall itself.
+
+    Args:
+        problem: The question.
+        path: Configurations, circular axes unwrapped, shape (m, 3 + n).
+        most: Clearances above this one do not matter [m].
+
+    Returns:
+        The clearance; it is measured at samples and proves nothing [m].
+    """
+    scale, team = configuration_scale(problem.tree), problem.tree.arrays
+    samples = densified(path, scale, 0.5 * SPACING)
+    clear = clearances(team, grid_for_team(problem.workspace, team), samples, FAR)
+    moved = [(np.abs(samples - samples[end]) * scale).sum(axis=1) for end in (0, -1)]
+    exempt = np.minimum(*moved) / EXEMPT_DISTANCE
+    least = most
+    while True:
+        below = clear[(clear < least) & (exempt > least)]
+        if not len(below):
+            return max(least, 0.0)
+        least = float(below.min())
+
+
+def _speeds(tree: ComponentTree) -> FloatArray:
+    """Highest average speed of every axis of z, shape (3 + n,) [m/s, rad/s]."""
+    return np.array([SPEED, SPEED, TURN_RATE, *[JOINT_RATE] * len(tree.joints)])
+
+
+# Paths with clearance: the best of some candidates, moved away from the walls and then straightened.
 
 LEAST_CLEARANCE = 0.002
 """Clearance that candidates keep [m], as paths of the first attempts do."""
@@ -18,7 +283,7 @@ LEAST_CLEARANCE = 0.002
 SAMPLED_CLEARANCE = 0.015
 """Clearance that other candidates are sampled with [m]: wider ones are faster."""
 
-CANDIDATES, CHOICES, SAMPLES, SEED = 2, 3, 2_500, 1
+CANDIDATES, CHOICES, CANDIDATE_SAMPLES, CANDIDATE_SEED = 2, 3, 2_500, 1
 """Number of other candidates, of paths of the object that each is chosen from, and of samples for every
 subsystem; the seed of the samples."""
 
@@ -64,9 +329,9 @@ def best_candidate(
         gap: Smallest distance between bodies of the team [m].
         share: Share of ``CANDIDATES`` that is sampled [-].
     """
-    sampler = Sampler(hierarchy, marginal_workspace(problem, SAMPLED_CLEARANCE), gap, SEED)
+    sampler = Sampler(hierarchy, marginal_workspace(problem, SAMPLED_CLEARANCE), gap, CANDIDATE_SEED)
     most = round(share * CANDIDATES)
-    sampled = [*takewhile(len, (sampler.path(SAMPLES, CHOICES) for _ in range(most)))]
+    sampled = [*takewhile(len, (sampler.path(CANDIDATE_SAMPLES, CHOICES) for _ in range(most)))]
     if len(sampled) < most and len(problem.goal_joints) > FEW_JOINTS:
         sampled += filter(len, (sampler.direct_path(OTHER_SAMPLES) for _ in range(most - len(sampled))))
     return _quickest(problem, [known, *sampled], gap)
@@ -84,7 +349,7 @@ def another_candidate(
         number: Other samples are drawn for every number (1, 2, ...).
         share: Share of ``OTHER_CANDIDATES`` that is sampled [-], at least one.
     """
-    sampler = Sampler(hierarchy, marginal_workspace(problem, SAMPLED_CLEARANCE), gap, SEED + number)
+    sampler = Sampler(hierarchy, marginal_workspace(problem, SAMPLED_CLEARANCE), gap, CANDIDATE_SEED + number)
     sampled = (sampler.direct_path(OTHER_SAMPLES) for _ in range(max(1, round(share * OTHER_CANDIDATES))))
     paths = [path for path in sampled if len(path)]
     return _quickest(problem, paths, gap) if paths else None

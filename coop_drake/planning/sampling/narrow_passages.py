@@ -4,28 +4,277 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from shapely import MultiPolygon, Polygon
 
 from coop_drake.answers.problem import PlanningProblem
-from coop_drake.geometry.parts import parts_of
-from coop_drake.planning.sampling.clearance_program import with_wider_passages
-from coop_drake.planning.sampling.collision_kernels import first_collision, is_free
-from coop_drake.planning.sampling.densify import densified
-from coop_drake.planning.sampling.elastic_band_kernels import improve
-from coop_drake.planning.sampling.obstacle_grid import grid_for_team
+from coop_drake.compiled import compiled
+from coop_drake.geometry.convex import following
+from coop_drake.geometry.parts import parts_of, polygon_rings
+from coop_drake.planning.questions import nearby
+from coop_drake.planning.sampling.band import clearances, improve
+from coop_drake.planning.sampling.collision import densified, first_collision, grid_for_team, is_free
 from coop_drake.tree.levers import configuration_scale
-from coop_drake.tree.pose import FloatArray
+from coop_drake.tree.pose import FloatArray, IntArray
+from coop_drake.tree.team_arrays import TeamArrays, moved, place
 
-BODY_GAP = 0.002
+if TYPE_CHECKING:
+    from scipy.optimize import LinearConstraint
+
+# Distances between what is near each other along a path, and how they change with the configurations.
+
+_STEP = 1e-5
+"""Step of the central differences of vertices [m or rad]: their errors are far below a micrometre."""
+
+_LEAST_DISTANCE = 1e-9
+"""Distances are divided by at least this [m]."""
+
+
+class Contacts(NamedTuple):
+    """Pairs of a vertex and an edge that are near each other, M of them.
+
+    Attributes:
+        rows: Sample of the path, shape (M,).
+        distances: Distance between the bodies there, or of the body from the wall, shape (M,) [m].
+        gradients: Its change per unit of each axis of z, shape (M, 3 + n).
+    """
+
+    rows: IntArray
+    distances: FloatArray
+    gradients: FloatArray
+
+
+class _Vertices(NamedTuple):
+    """All vertices of a team along a path of K samples, shapes (K, V, 2) and (K, V, 2, 3 + n)."""
+
+    places: FloatArray
+    changes: FloatArray
+
+
+@compiled
+def _places(team: TeamArrays, path: FloatArray) -> FloatArray:
+    """Positions of all vertices in W, shape (K, V, 2) [m]."""
+    places = np.empty((len(path), len(team.vertices), 2))
+    for k in range(len(path)):
+        poses = place(team, path[k])
+        for piece in range(len(team.pieces)):
+            X = poses[team.pieces[piece, 0]]
+            for v in range(team.pieces[piece, 1], team.pieces[piece, 2]):
+                x, y = moved(X[0], X[1], X[2], X[3], team.vertices[v, 0], team.vertices[v, 1])
+                places[k, v, 0], places[k, v, 1] = x, y
+    return places
+
+
+def _vertices(team: TeamArrays, path: FloatArray) -> _Vertices:
+    steps = _STEP * np.eye(path.shape[1])
+    changes = [(_places(team, path + step) - _places(team, path - step)) / (2.0 * _STEP) for step in steps]
+    return _Vertices(_places(team, path), np.stack(changes, axis=-1))
+
+
+def wall_contacts(team: TeamArrays, path: FloatArray, edges: FloatArray, near: float) -> Contacts:
+    """Vertices of the team near a wall, and corners of walls near an edge of the team.
+
+    Args:
+        team: The team.
+        path: Free configurations, shape (K, 3 + n).
+        edges: Edges (x0, y0, x1, y1) of the floor's closed rings, shape (E, 4) [m].
+        near: Only distances below this one are listed [m].
+    """
+    vertices = _vertices(team, path)
+    still = np.zeros((len(path), len(edges), 2, path.shape[1]))
+    ends = (np.broadcast_to(edges[:, side], (len(path), len(edges), 2)) for side in ((0, 1), (2, 3)))
+    first, last = (_Vertices(end, still) for end in ends)
+    radii = _radii(team)
+    ring = _ring_order(team)
+    own = _Vertices(vertices.places[:, ring], vertices.changes[:, ring])
+    return _joined(
+        _contacts(vertices, first, last, radii[:, None], near),
+        _contacts(first, vertices, own, radii[None, :], near),
+    )
+
+
+def body_contacts(team: TeamArrays, path: FloatArray, near: float) -> Contacts:
+    """Vertices of bodies near an edge of another body that must not touch; see ``wall_contacts``."""
+    vertices, ring, found = _vertices(team, path), _ring_order(team), []
+    for one, other in (*team.pairs, *team.pairs[:, ::-1]):
+        mine, theirs = np.arange(*team.pieces[one, 1:]), np.arange(*team.pieces[other, 1:])
+        points, first, last = (
+            _Vertices(vertices.places[:, rows], vertices.changes[:, rows])
+            for rows in (mine, theirs, ring[theirs])
+        )
+        grown = np.full((1, 1), team.radii[one] + team.radii[other])
+        found.append(_contacts(points, first, last, grown, near))
+    none = Contacts(np.empty(0, np.int64), np.empty(0), np.empty((0, path.shape[1])))
+    return _joined(none, *found)
+
+
+def _contacts(
+    points: _Vertices, first: _Vertices, last: _Vertices, grown: FloatArray, near: float
+) -> Contacts:
+    """Points near segments from first to last, whose distance is smaller by what the bodies are grown by."""
+    a, along = first.places[:, None], (last.places - first.places)[:, None]
+    squares = (along**2).sum(axis=-1)
+    away = points.places[:, :, None] - a
+    share = (away * along).sum(axis=-1) / np.where(squares > 0.0, squares, 1.0)
+    share = np.clip(share, 0.0, 1.0)
+    away = away - share[..., None] * along
+    lengths = np.hypot(away[..., 0], away[..., 1])
+    k, i, j = np.nonzero(lengths - grown < near)
+    normals = away[k, i, j] / np.maximum(lengths[k, i, j], _LEAST_DISTANCE)[:, None]
+    s = share[k, i, j][:, None, None]
+    changes = points.changes[k, i] - (1.0 - s) * first.changes[k, j] - s * last.changes[k, j]
+    distances = (lengths - grown)[k, i, j]
+    return Contacts(k, distances, np.einsum("mc,mcd->md", normals, changes))
+
+
+def _radii(team: TeamArrays) -> FloatArray:
+    """What each vertex's piece is grown by, shape (V,) [m]."""
+    counts = team.pieces[:, 2] - team.pieces[:, 1]
+    grown: FloatArray = np.repeat(team.radii, counts)
+    return grown
+
+
+def _ring_order(team: TeamArrays) -> IntArray:
+    """For each vertex the one that follows it in its piece, shape (V,)."""
+    parts = [following(np.arange(first, last)) for _, first, last in team.pieces]
+    return np.concatenate(parts).astype(np.int64)
+
+
+def _joined(*contacts: Contacts) -> Contacts:
+    return Contacts(*(np.concatenate(parts) for parts in zip(*contacts, strict=True)))
+
+
+# A linear program that moves a path such that its least distance from the walls becomes larger.
+#
+# Distances are linear in small moves. With as many walls touched as there are axes, random moves hardly
+# ever lead away from all of them, and the program's solution does.
+
+WIDE_ENOUGH = 0.003
+"""A sample with this distance from the walls need not be moved further from them [m]."""
+
+BESIDE = 2
+"""So many samples beside those that are moved for their distance are moved, too."""
+
+NEAR = 0.03
+"""Distances up to this one are in the program [m]."""
+
+BODY_GAP = 0.001
+"""Distance that bodies of the team keep from each other, where they have it [m]."""
+
+MEAN_WEIGHT = 0.3
+"""Weight of the mean of all distances beside the least one's 1 [-]: wider places hold longer boxes."""
+
+
+def with_wider_passages(
+    problem: PlanningProblem, path: FloatArray, most: float, spacing: float
+) -> FloatArray:
+    """Move the samples near walls such that the least distance from the walls grows, to first order.
+
+    The path's ends stay. That the result is free has to be tested.
+
+    Args:
+        problem: The question, on whose floor all samples are free.
+        path: Samples, close together, circular axes unwrapped, shape (m, 3 + n).
+        most: Largest move of a sample in any scaled axis [m].
+        spacing: Largest distance of neighbours in any scaled axis that the moves may lead to [m].
+    """
+    from scipy.optimize import Bounds, milp  # Here: its import takes a tenth of a second.
+
+    tree = problem.tree
+    team, scale = tree.arrays, configuration_scale(tree)
+    clear = clearances(team, grid_for_team(problem.workspace, team), path, WIDE_ENOUGH + NEAR)
+    chosen = np.convolve(clear < WIDE_ENOUGH + most, np.ones(1 + 2 * BESIDE), "same") > 0.0
+    chosen[[0, -1]] = False
+    samples = path[chosen]
+    if not len(samples):
+        return path
+    walls = wall_contacts(team, samples, _edges_near(problem, samples), NEAR)
+    bodies = body_contacts(team, samples, NEAR)
+    count, axes = samples.shape
+    own, moves = np.arange(count), count * axes
+    rows = _Rows(axes, scale)
+    rows.add_distances(walls, -walls.distances, (own[walls.rows] + moves, -1.0))
+    rows.add_distances(bodies, np.minimum(bodies.distances, BODY_GAP) - bodies.distances)
+    rows.add(np.zeros(count), np.inf, (own, moves + own, 1.0), (own, moves + count, -1.0))
+    rows.add_neighbours(path * scale, chosen, spacing)
+    lower, upper = np.full((count, axes), -most), np.full((count, axes), most)
+    lower[:, 3:] = np.clip((tree.joint_lower - samples[:, 3:]) * scale[3:], -most, 0.0)
+    upper[:, 3:] = np.clip((tree.joint_upper - samples[:, 3:]) * scale[3:], 0.0, most)
+    widest = np.full(count + 1, WIDE_ENOUGH)
+    cost = np.concatenate([np.zeros(moves), np.full(count, -MEAN_WEIGHT / count), [-1.0]])
+    bounds = Bounds(np.append(lower, -widest), np.append(upper, widest))
+    solved = milp(cost, bounds=bounds, constraints=rows.constraint(len(cost)))
+    better = path.copy()
+    if solved.x is not None:
+        better[chosen] += solved.x[:moves].reshape(count, axes) / scale
+    return better
+
+
+def _edges_near(problem: PlanningProblem, samples: FloatArray) -> FloatArray:
+    """Edges of the floor that the team may come near, (x0, y0, x1, y1), shape (E, 4) [m]."""
+    rings = polygon_rings(nearby(problem.workspace, samples[:, :2], problem.tree.reach))
+    return np.concatenate([np.hstack((ring, following(ring))) for ring in rings])
+
+
+class _Rows:
+    """Rows of a sparse matrix with bounds; columns are scaled moves, clearances and the least of these."""
+
+    def __init__(self, axes: int, scale: FloatArray) -> None:
+        self._axes, self._scale, self._count = axes, scale, 0
+        self._entries: list[tuple[FloatArray, FloatArray, FloatArray]] = []
+        self._bounds: list[tuple[FloatArray, FloatArray]] = []
+
+    def add(self, lower: FloatArray, upper: FloatArray | float, *entries: tuple[Any, Any, Any]) -> None:
+        """Add rows: bounds, and entries as (row, column, value) with arrays of one shape, or numbers."""
+        for entry in entries:
+            row, column, value = (part.ravel() for part in np.broadcast_arrays(*entry))
+            self._entries.append((row + self._count, column, value))
+        self._bounds.append((lower, np.broadcast_to(upper, lower.shape)))
+        self._count += len(lower)
+
+    def add_distances(self, contacts: Contacts, lower: FloatArray, *others: tuple[Any, Any]) -> None:
+        """Add a row for every contact: how moves change its distance; other entries as (column, value)."""
+        row = np.arange(len(lower))
+        column = contacts.rows[:, None] * self._axes + np.arange(self._axes)
+        changes = (row[:, None], column, contacts.gradients / self._scale)
+        self.add(lower, np.inf, changes, *((row, column, value) for column, value in others))
+
+    def add_neighbours(self, path: FloatArray, chosen: NDArray[np.bool_], spacing: float) -> None:
+        """Add rows that keep neighbours of a scaled path within the spacing, or as far apart as they are."""
+        number = np.cumsum(chosen) - 1
+        apart = np.diff(path, axis=0)
+        for axis in range(self._axes):
+            kept = chosen[1:] | chosen[:-1]
+            between = apart[kept, axis]
+            row, far = np.arange(len(between)), np.maximum(spacing, np.abs(between))
+            entries = [
+                (row[own], number[side][kept][own] * self._axes + axis, sign)
+                for side, sign in ((slice(1, None), 1.0), (slice(None, -1), -1.0))
+                for own in [chosen[side][kept]]
+            ]
+            self.add(-far - between, far - between, *entries)
+
+    def constraint(self, columns: int) -> LinearConstraint:
+        """The rows as a constraint on so many variables."""
+        from scipy.optimize import LinearConstraint
+        from scipy.sparse import csr_array
+
+        row, column, value = (np.concatenate(parts) for parts in zip(*self._entries, strict=True))
+        lower, upper = (np.concatenate(parts) for parts in zip(*self._bounds, strict=True))
+        matrix = csr_array((value, (row, column)), shape=(self._count, columns))
+        return LinearConstraint(matrix, lower, upper)
+
+
+LEAST_BODY_GAP = 0.002
 """Distance that bodies of the team keep from each other [m]."""
 
 PRICES = (0.04, 5e-4, 0.1)
 """A sample with clearance c costs [0] / ([1] + min(c, [2])) [m]: steep, so the narrowest place counts."""
 
-SPACING = 0.05
+REPAIR_SPACING = 0.05
 """Distance between samples of a path in any scaled axis [m]."""
 
 MOVES = 2_000
@@ -89,7 +338,7 @@ def ease_less(eased: Eased, path: FloatArray, amount: float, enough: float = 0.0
     Returns:
         The path, and the amount with which all its samples are free; this is measured and proves nothing.
     """
-    path = densified(path, configuration_scale(eased(amount).tree), SPACING)
+    path = densified(path, configuration_scale(eased(amount).tree), REPAIR_SPACING)
     needed, worst = amount_needed(eased, path, amount)
     for number in range(ROUNDS_OF_MOVES):
         if needed <= enough:
@@ -127,7 +376,7 @@ def with_larger_least_clearance(
         np.concatenate((unbounded, tree.joint_upper)),
         scale,
         scale,
-        BODY_GAP,
+        LEAST_BODY_GAP,
         free_end and all(value is None for value in problem.goal_joints),
         np.random.default_rng(seed).random((MOVES, 5)),
     )

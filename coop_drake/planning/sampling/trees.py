@@ -1,18 +1,287 @@
-"""Compiled bidirectional random trees: a source of candidate paths, never of proofs."""
+"""Compiled bidirectional random trees and what they grow to: a source of candidate paths, never of proofs."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from math import floor, pi, sqrt
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from coop_drake.compiled import compiled
-from coop_drake.planning.sampling.collision_kernels import is_free, segment_is_free
-from coop_drake.planning.sampling.guided_samples import SampledRegion, draw, furthest_row, guide_row
-from coop_drake.planning.sampling.nearest_node import Tree, add, empty_tree, nearest
-from coop_drake.planning.sampling.obstacle_grid import ObstacleGrid
+from coop_drake.planning.sampling.collision import ObstacleGrid, component_is_free, is_free, segment_is_free
 from coop_drake.tree.pose import FloatArray, IntArray
-from coop_drake.tree.team_arrays import TeamArrays
+from coop_drake.tree.team_arrays import TeamArrays, place_component
+
+# Nodes of a random tree, and a grid that finds the one nearest to a configuration; compiled.
+
+_SQUARES, _TURNS = 600, 16
+"""Squares of the grid in which nodes are found again, and parts of a full turn for each of them."""
+
+
+class Tree(NamedTuple):
+    """Nodes of a random tree, and a grid that finds the nodes near a position with about the same theta.
+
+    Attributes:
+        nodes: Configurations, shape (N, d).
+        parents: Their parents, -1 for roots, shape (N,).
+        filled: A bit for each part of a turn of each square: 1 if nodes are there, shape (S,).
+        latest: The latest node in each square and part of a turn, where there are any, shape (S, T).
+        before: For each node the one before it in its place, -1 if there is none, shape (N,).
+        frame: Lower corner of the grid and the side of a square, shape (3,) [m].
+        rows: Number of squares along y; squares are numbered along y first.
+        circular: Which axes of configurations are circles, shape (d,).
+    """
+
+    nodes: FloatArray
+    parents: IntArray
+    filled: IntArray
+    latest: IntArray
+    before: IntArray
+    frame: FloatArray
+    rows: int
+    circular: NDArray[np.bool_]
+
+
+@compiled
+def empty_tree(capacity: int, lower: FloatArray, upper: FloatArray, circular: NDArray[np.bool_]) -> Tree:
+    """A tree without nodes, with memory for ``capacity`` of them, on a floor between two corners."""
+    width, height = upper[0] - lower[0], upper[1] - lower[1]
+    side = max(sqrt(width * height / _SQUARES), 1e-9)
+    rows, columns = int(height / side) + 1, int(width / side) + 1
+    return Tree(
+        np.empty((capacity, len(lower))), np.full(capacity, -1), np.zeros(rows * columns, np.int64),
+        np.empty((rows * columns, _TURNS), np.int64), np.full(capacity, -1),
+        np.array([lower[0], lower[1], side]), rows, circular,
+    )  # fmt: skip
+
+
+@compiled
+def _place_of(tree: Tree, z: FloatArray) -> tuple[int, int, float]:
+    """Column and row of the square nearest to a position, and theta counted in parts of a turn."""
+    columns = len(tree.latest) // tree.rows
+    column = min(max(int((z[0] - tree.frame[0]) / tree.frame[2]), 0), columns - 1)
+    row = min(max(int((z[1] - tree.frame[1]) / tree.frame[2]), 0), tree.rows - 1)
+    turns = z[2] / (2.0 * pi)
+    return column, row, (turns - floor(turns)) * _TURNS
+
+
+@compiled
+def add(tree: Tree, index: int, z: FloatArray, parent: int) -> None:
+    """Store a node."""
+    column, row, turned = _place_of(tree, z)
+    square, part = column * tree.rows + row, int(turned) % _TURNS
+    for k in range(len(z)):
+        tree.nodes[index, k] = z[k]
+    tree.parents[index] = parent
+    if tree.filled[square] >> part & 1:
+        tree.before[index] = tree.latest[square, part]
+    tree.filled[square] |= 1 << part
+    tree.latest[square, part] = index
+
+
+@compiled
+def _off(tree: Tree, place: int, last: int, axis: int, x: float) -> float:
+    """Distance in one axis from a coordinate to a row or column of squares; outer ones go on outwards."""
+    low = tree.frame[axis] + place * tree.frame[2]
+    if x < low:
+        return low - x if place > 0 else 0.0
+    return max(x - low - tree.frame[2], 0.0) if place < last else 0.0
+
+
+@compiled
+def _nearest_in(
+    tree: Tree, node: int, z: FloatArray, scale: FloatArray, best: float, index: int
+) -> tuple[float, int]:
+    """The nearest of the nodes of one place, given its latest one, and of the one known before."""
+    while node >= 0:
+        total = 0.0
+        for k in range(len(z)):
+            d = z[k] - tree.nodes[node, k]
+            if tree.circular[k]:
+                d -= 2.0 * pi * floor(d / (2.0 * pi) + 0.5)
+            total += (d * scale[k]) ** 2
+            if total >= best:
+                break
+        if total < best:
+            best, index = total, node
+        node = tree.before[node]
+    return best, index
+
+
+@compiled
+def nearest(tree: Tree, z: FloatArray, scale: FloatArray) -> int:
+    """Index of the node nearest to z; circular axes are periodic, theta (axis 2) among them.
+
+    Squares are searched in growing rings, and in each of them the parts of a turn on both sides of theta.
+    """
+    best, index = np.inf, 0
+    column, row, turned = _place_of(tree, z)
+    columns, part = len(tree.latest) // tree.rows, int(turned)
+    unit, turn = min(scale[0], scale[1]) * tree.frame[2], 2.0 * pi / _TURNS * scale[2]
+    for ring in range(max(columns, tree.rows) + 1):
+        if ring > 1 and best <= ((ring - 1) * unit) ** 2:
+            break
+        for i in range(max(column - ring, 0), min(column + ring + 1, columns)):
+            step = 1 if abs(i - column) == ring else 2 * ring
+            across = (_off(tree, i, columns - 1, 0, z[0]) * scale[0]) ** 2
+            for j in range(row - ring, row + ring + 1, max(step, 1)):
+                square = i * tree.rows + j
+                if j < 0 or j >= tree.rows or tree.filled[square] == 0:
+                    continue
+                off = across + (_off(tree, j, tree.rows - 1, 1, z[1]) * scale[1]) ** 2
+                for k in range(_TURNS // 2 + 1):
+                    if off + (max(k - 1, 0) * turn) ** 2 >= best:
+                        break
+                    for side in range(1 if k == 0 or 2 * k == _TURNS else 2):
+                        at = (part + k if side == 0 else part - k) % _TURNS
+                        if tree.filled[square] >> at & 1:
+                            node = tree.latest[square, at]
+                            best, index = _nearest_in(tree, node, z, scale, best, index)
+    return index
+
+
+# Compiled samples around a guide path: along it or where trees have come far, component by component.
+
+_GUIDED = 0.85
+"""Fraction of the samples that are drawn around the guiding path [-]; the others are uniform."""
+
+_LEAST_SPREAD = 0.1
+"""Smallest fraction of the spread that a guided sample uses [-]: some samples stay close to the guide."""
+
+_EVERYWHERE = 0.2
+"""Fraction of the samples around a guide that is followed that are drawn along all of it [-]."""
+
+_WINDOW = 20
+"""The others are drawn up to so many rows before and after the furthest row: two metres of way."""
+
+_AT_ROW = 0.5
+"""A tree has reached a row of the guide when it has a node this near to it [m]."""
+
+_STEPS = (0.8191725133961645, 0.6710436067037893, 0.5497004779019703, 0.6180339887498949)
+"""Steps between the values that are tried of x, y, theta and a joint, as fractions of their ranges [-]: 1/g,
+1/g^2 and 1/g^3 with g^4 = g + 1, whose multiples fill a cube evenly, and 1/g with g^2 = g + 1 for an
+interval."""
+
+
+@dataclass(frozen=True)
+class GuidePath:
+    """A path of a smaller subsystem, around which a larger subsystem is sampled.
+
+    Attributes:
+        path: Configurations, shape (m, 3 + k).
+        joints: For each of its joints the index of that joint in the whole q.
+        has_theta: Whether its theta is to be followed; False for a disc, whose angle has no meaning.
+    """
+
+    path: FloatArray
+    joints: tuple[int, ...]
+    has_theta: bool = True
+
+
+class SampledRegion(NamedTuple):
+    """What is sampled: a box, and in it mostly the surroundings of a guide path.
+
+    Attributes:
+        guide: Configurations to sample around, shape (G, d); may be empty.
+        spread: How far around, for each axis; 0 for axes that the guide does not know, shape (d,) [m, rad].
+        lower: Lower ends of the box that is sampled uniformly, shape (d,) [m, rad].
+        upper: Upper ends, shape (d,).
+        circular: Which axes are circles: guided samples may lie beyond these ends there, shape (d,).
+        long: A guide with more rows than this [-] is followed: most samples are drawn where a tree has come
+            furthest, because those far from both trees are of little use.
+        tries: Values that are tried for the axes of a component until it is free [-]; with one try samples
+            are not looked at.
+    """
+
+    guide: FloatArray
+    spread: FloatArray
+    lower: FloatArray
+    upper: FloatArray
+    circular: NDArray[np.bool_]
+    long: int
+    tries: int
+
+
+@compiled
+def guide_row(region: SampledRegion, number: float, front: int) -> int:
+    """Row of the guide to sample around, for a random number in [0, 1) and the furthest row reached."""
+    count = len(region.guide)
+    if count <= region.long:
+        return min(count - 1, int(number * count))
+    if number < _EVERYWHERE:
+        return int(number / _EVERYWHERE * count)
+    first, last = max(0, front - _WINDOW), min(count, front + _WINDOW + 1)
+    return first + int((number - _EVERYWHERE) / (1.0 - _EVERYWHERE) * (last - first))
+
+
+@compiled
+def furthest_row(region: SampledRegion, front: int, side: int, z: FloatArray) -> int:
+    """Furthest row of the guide that the tree of a side has reached, now that it has a node at z."""
+    guide = region.guide
+    step, row = 1 - 2 * side, front
+    for _ in range(2 * _WINDOW if len(guide) > region.long else 0):
+        row += step
+        if row < 0 or row >= len(guide):
+            break
+        if (z[0] - guide[row, 0]) ** 2 + (z[1] - guide[row, 1]) ** 2 < _AT_ROW * _AT_ROW:
+            front = row
+    return front
+
+
+@compiled(inlined=True)
+def _value(region: SampledRegion, u: FloatArray, at: int, k: int, number: float) -> float:
+    """Value of an axis for a random number: around the guide, or anywhere on axes without spread.
+
+    Some samples keep closer to the guide than others: what is narrow for the guide is narrower for what it
+    guides.
+    """
+    lower, upper, spread = region.lower[k], region.upper[k], region.spread[k]
+    if len(region.guide) == 0 or u[0] >= _GUIDED or spread == 0.0:
+        return float(lower + number * (upper - lower))
+    fraction = _LEAST_SPREAD + (1.0 - _LEAST_SPREAD) * u[0] / _GUIDED
+    value = region.guide[at, k] + (2.0 * number - 1.0) * fraction * spread
+    return float(value if k < 2 or region.circular[k] else min(upper, max(lower, value)))
+
+
+@compiled
+def draw(
+    team: TeamArrays, grid: ObstacleGrid, region: SampledRegion, u: FloatArray, at: int, gap: float
+) -> FloatArray:
+    """Draw one sample whose components, from the object outwards, get other values until they are free.
+
+    Few samples of a large team are free otherwise.
+
+    Args:
+        team: The team.
+        grid: The floor.
+        region: What is sampled.
+        u: Random numbers in [0, 1), shape (2 + d,).
+        at: Row of the guide to sample around.
+        gap: Distance that pairs of bodies must keep [m].
+
+    Returns:
+        A configuration, which need not be free, shape (d,) [m, rad].
+    """
+    z = np.empty(len(region.lower))
+    for k in range(len(z)):
+        z[k] = _value(region, u, at, k, u[2 + k])
+    poses = np.empty((len(team.links), 5))
+    for component in range(len(team.links) if region.tries > 1 else 0):
+        for number in range(1, region.tries + 1):
+            place_component(team, z, component, poses)
+            if number == region.tries or component_is_free(team, grid, poses, component, gap):
+                break
+            posed = team.links[component, 0] < 0
+            first, last = (0, 3) if posed else (team.links[component, 1], team.links[component, 1] + 1)
+            for k in range(first, last):
+                step = _STEPS[k if posed else 3]
+                z[k] = _value(region, u, at, k, (u[2 + k] + number * step) % 1.0)
+    return z
+
+
+# Compiled bidirectional random trees: a source of candidate paths, never of proofs.
 
 
 @compiled

@@ -1,1 +1,0 @@
-"""Boxes of configurations that are proved free, laid along a candidate path."""

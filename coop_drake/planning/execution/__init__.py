@@ -1,1 +1,0 @@
-"""From a channel of free boxes to a plan that controllers can follow."""
