@@ -8,8 +8,7 @@ import pytest
 from shapely import Point
 
 from benchmarks.planner.family import corridor_problem
-from coop_drake.planning import Channel, find_channel
-from coop_drake.planning import sampled_search
+from coop_drake.planning import Channel, find_channel, sampled_search
 from coop_drake.planning.sampled_search import NarrowSearch
 from coop_drake.planning.sampling.narrow_passages import (
     amount_needed,
