@@ -1,15 +1,16 @@
-"""``python -m benchmarks``: measures, writes out/bench.json as it goes, and shows tables; or lists itself."""
+"""``python -m benchmarks``: measures and writes out/bench.json as it goes; makes studies by ``study.py``."""
 
 from __future__ import annotations
 
 from contextlib import closing
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 from rich.console import Console
 from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+from typer.core import TyperGroup
 
 from benchmarks.adversaries.measured import adversary_tasks
 from benchmarks.alarms import alarm_tasks
@@ -36,13 +37,18 @@ from benchmarks.planner.head_to_head import Effort, head_to_head_tasks
 from benchmarks.planner.ours import compile_kernels
 from benchmarks.planner.stages import stage_tasks
 from benchmarks.planner.teams import team_tasks
+from benchmarks.questions.ompl_peer import has_ompl
+from benchmarks.questions.question import random_question
 from benchmarks.rejoining import rejoining_tasks
 from benchmarks.simulating import simulating_tasks
 from benchmarks.starting import starting_tasks
 from benchmarks.stops import stops_tasks
+from benchmarks.study import Study, batches_of, load_study, make_study, show_results
 from benchmarks.table import show
 from benchmarks.tasks import Task, chosen, worked
-from coop_drake.campaign.questions.ompl_peer import has_ompl
+from coop_drake.campaign.results import CampaignFolder
+from coop_drake.cli.reporter import ExitCode, reporting
+from coop_drake.errors import ScenarioError
 
 __all__ = ["app"]
 
@@ -53,10 +59,72 @@ _ABLATION_LIMIT = 5.0
 _COMPILING_LIMIT = 600.0
 _COMMANDED = ("base", "tight", "closed", "three", "elbow")
 
-app = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
+
+class _MeasureByDefault(TyperGroup):
+    """Takes ``python -m benchmarks TOPIC`` for ``python -m benchmarks measure TOPIC``."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Put ``measure`` before arguments that begin with no command."""
+        if not args or (args[0] not in self.commands and args[0] != "--help"):
+            args = ["measure", *args]
+        return super().parse_args(ctx, args)
 
 
-@app.command()
+app = typer.Typer(cls=_MeasureByDefault, add_completion=False, pretty_exceptions_enable=False)
+
+StudyFile = Annotated[Path, typer.Argument(metavar="FILE", dir_okay=False, help="File of a study (*.yaml).")]
+StudyOut = Annotated[
+    Path | None, typer.Option(help="Folder of the results; out/campaigns and the file's name by default.")
+]
+
+
+@app.command("study")
+def study_command(
+    file: StudyFile,
+    out: StudyOut = None,
+    workers: Annotated[int | None, typer.Option(min=1, help="Batches at a time; one a core.")] = None,
+    scheduler: Annotated[str | None, typer.Option(help="Address of a Dask scheduler that exists.")] = None,
+    status: Annotated[bool, typer.Option("--status", help="Only show what is there.")] = False,
+    machine: Annotated[bool, typer.Option("--json", help="One JSON object on standard output.")] = False,
+) -> None:
+    """Answer random questions and search for departures with which runs are lost, as a file asks.
+
+    The exit code is 1 if an answer is wrong, or a run is lost inside what is certified.
+    """
+    with reporting(machine=machine) as reporter:
+        study, folder = _read(file, out)
+        if status:
+            batches = batches_of(study, folder)
+        else:
+            with reporter.stage("study", "study") as progress:
+                batches = make_study(
+                    study, folder, workers=workers, scheduler=scheduler, progress=progress
+                ).batches
+        show_results(folder, batches, reporter)
+        reporter.code = ExitCode.DONE if status else reporter.code
+
+
+@app.command("question")
+def question_command(
+    file: StudyFile,
+    number: Annotated[int, typer.Argument(metavar="NUMBER", min=0, help="Number of the question.")],
+    out: StudyOut = None,
+) -> None:
+    """Write a random question as a scenario with its models, to be planned or looked at like any other."""
+    with reporting() as reporter:
+        study, folder = _read(file, out)
+        if study.questions is None:
+            raise ScenarioError(str(file), "questions", None, "a section of questions")
+        drawn = random_question(study.questions, number, folder.path / "drawn" / str(number))
+        reporter.say(f"Next: coop-drake plan {drawn.scenario.path}")
+
+
+def _read(file: Path, out: Path | None) -> tuple[Study, CampaignFolder]:
+    study = load_study(file)
+    return study, CampaignFolder((out or Path("out") / "campaigns" / study.name).absolute())
+
+
+@app.command("measure")
 def main(
     topics: Annotated[
         list[str] | None,

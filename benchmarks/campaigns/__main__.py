@@ -1,4 +1,4 @@
-"""``python -m benchmarks.campaigns``: makes the campaigns of this folder, and prints one table of each.
+"""``python -m benchmarks.campaigns``: makes campaigns and studies of this folder, and prints their tables.
 
 They take hours, at the lowest priority. What is there is kept: the same command goes on after an
 interruption. Tables are Markdown, as the documentation has them.
@@ -15,13 +15,14 @@ from typing import Annotated
 
 import typer
 
-from coop_drake.campaign import Campaign, load_campaign
+from benchmarks import study
+from benchmarks.questions.summary import seconds_shown
+from benchmarks.searches.bisections import multiple_shown
+from benchmarks.searches.summary import summarise_searches
+from coop_drake.campaign import load_campaign
 from coop_drake.campaign.report import Report, make_report
-from coop_drake.campaign.report.bisections import multiple_shown
 from coop_drake.campaign.report.columns import MARGINS, SHARE
-from coop_drake.campaign.report.questions import seconds_shown
 from coop_drake.campaign.report.rates import percent, percent_up
-from coop_drake.campaign.report.searches import summarise_searches
 from coop_drake.campaign.results import CampaignFolder
 from coop_drake.campaign.running.command import batches_of
 
@@ -48,45 +49,54 @@ def main(
         raise typer.Exit(2)
     code = 0
     for name in names or NAMES:
-        file, folder = _HERE / f"{name}.campaign.yaml", out / name
+        (file,), folder = _HERE.glob(f"{name}.*.yaml"), out / name
         if not tables:
             code = max(code, _made(file, folder, workers))
-        print("\n".join(_tables(load_campaign(file), CampaignFolder(folder.absolute()))), flush=True)
+        print("\n".join(_tables(file, CampaignFolder(folder.absolute()))), flush=True)
     raise typer.Exit(code)
 
 
 def _made(file: Path, folder: Path, workers: int | None) -> int:
-    """Make a campaign and its report in processes of the lowest priority; return the exit code.
+    """Make a campaign with its report, or a study, in processes of the lowest priority; return the exit code.
 
     Raises:
         Exit: It did not come to its end; with its exit code.
     """
-    command = [sys.executable, "-c", "from coop_drake.cli import main; main()", "campaign"]
-    options = ["--out", str(folder), *(["--workers", str(workers)] if workers else [])]
+    campaign = [sys.executable, "-c", "from coop_drake.cli import main; main()", "campaign"]
+    others = [sys.executable, "-m", "benchmarks", "study"]
+    options = [str(file), "--out", str(folder)]
     done = subprocess.run(
-        [*command, "run", str(file), *options], preexec_fn=lambda: os.nice(_LEAST_PRIORITY), check=False
+        [*(others if _is_study(file) else [*campaign, "run"]), *options]
+        + (["--workers", str(workers)] if workers else []),
+        preexec_fn=lambda: os.nice(_LEAST_PRIORITY),
+        check=False,
     )
     if done.returncode not in _FINISHED:
         raise typer.Exit(done.returncode)
-    subprocess.run([*command, "report", str(file), "--out", str(folder)], check=True)
+    if not _is_study(file):
+        subprocess.run([*campaign, "report", *options], check=True)
     return done.returncode
 
 
-def _tables(campaign: Campaign, folder: CampaignFolder) -> Iterator[str]:
-    """Yield the lines of the tables of a campaign."""
-    batches = batches_of(campaign, folder)
-    findings, breaking = folder.findings(batches)
-    report = make_report(
-        campaign.name, folder.table(batches), folder.questions(batches), findings=findings, breaking=breaking
-    )
+def _is_study(file: Path) -> bool:
+    return file.name.endswith(".study.yaml")
+
+
+def _tables(file: Path, folder: CampaignFolder) -> Iterator[str]:
+    """Yield the lines of the tables of a campaign or of a study."""
+    if _is_study(file):
+        batches = study.batches_of(study.load_study(file), folder)
+        results = study.results_of(folder, batches)
+        tables = [_searches(results), _breaking(results), _questions(results)]
+    else:
+        campaign = load_campaign(file)
+        batches = batches_of(campaign, folder)
+        tables = [_runs(make_report(campaign.name, folder.table(batches)))]
     there = len(batches) - len(folder.missing(batches))
-    yield f"\n## {campaign.name}: {there} of {len(batches)} batches"
-    seconds = folder.cpu_seconds(batches)
-    yield f"\nCPU time of each, with its share of starting processes: {seconds:.3g} s\n"
-    yield from _markdown(_runs(report))
-    yield from _markdown(_searches(report))
-    yield from _markdown(_breaking(report))
-    yield from _markdown(_questions(report))
+    yield f"\n## {file.name.partition('.')[0]}: {there} of {len(batches)} batches"
+    yield f"\nCPU time of each, with its share of starting processes: {folder.cpu_seconds(batches):.3g} s\n"
+    for table in tables:
+        yield from _markdown(table)
 
 
 def _markdown(lines: Iterator[Line]) -> Iterator[str]:
@@ -108,7 +118,7 @@ def _runs(report: Report) -> Iterator[Line]:
         yield group.scenario, group.tier, rate.runs, rate.lost, percent_up(rate.upper), *margins, used
 
 
-def _searches(report: Report) -> Iterator[Line]:
+def _searches(results: study.Results) -> Iterator[Line]:
     yield (
         "searches",
         "driven",
@@ -120,20 +130,20 @@ def _searches(report: Report) -> Iterator[Line]:
         "usual find",
         "worst find",
     )
-    for row in summarise_searches(report.findings):
+    for row in summarise_searches(results.findings):
         ends = (f"{number:.4g}" for number in (row.before, row.typical, row.worst.worst))
         yield row.scenario, row.margin, row.searches, row.runs, row.lost, row.failed, *ends
 
 
-def _breaking(report: Report) -> Iterator[Line]:
-    names = list(dict.fromkeys(point.scenario for point in report.breaking))
+def _breaking(results: study.Results) -> Iterator[Line]:
+    names = list(dict.fromkeys(point.scenario for point in results.points))
     yield "largest multiple of what is certified without a loss", *names
-    for departure in dict.fromkeys(point.departure for point in report.breaking):
-        own = {point.scenario: point for point in report.breaking if point.departure == departure}
+    for departure in dict.fromkeys(point.departure for point in results.points):
+        own = {point.scenario: point for point in results.points if point.departure == departure}
         yield departure, *(multiple_shown(own.get(name)) for name in names)
 
 
-def _questions(report: Report) -> Iterator[Line]:
+def _questions(results: study.Results) -> Iterator[Line]:
     yield (
         "questions",
         "asked",
@@ -146,7 +156,7 @@ def _questions(report: Report) -> Iterator[Line]:
         "95 %",
         "largest",
     )
-    for row in report.questions:
+    for row in results.questions:
         name = row.group if row.axis == row.group else f"{row.axis} {row.group}"
         times = map(seconds_shown, (row.seconds.median, row.seconds.high, row.seconds.largest))
         counts = row.count, row.plans, row.infeasible, row.undecided, row.wrong, row.peer_found

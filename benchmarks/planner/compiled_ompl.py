@@ -7,9 +7,9 @@ from collections.abc import Callable, Sequence
 import numba
 import numpy as np
 
+from benchmarks.questions.ompl_peer import run_ompl
+from benchmarks.questions.peer import PeerRun
 from coop_drake.answers import PlanningProblem
-from coop_drake.campaign.questions.ompl_peer import run_ompl
-from coop_drake.campaign.questions.peer import PeerRun
 from coop_drake.planning.sampling.collision import grid_for_team, is_free
 from coop_drake.tree.team_arrays import team_arrays
 

@@ -14,13 +14,13 @@ from benchmarks.isolated import in_own_process
 from benchmarks.planner.compiled_ompl import run_compiled_ompl
 from benchmarks.planner.family import corridor_problem
 from benchmarks.planner.ours import plan_repeatedly
+from benchmarks.questions.ompl_peer import has_ompl
+from benchmarks.questions.path_check import fault_of
+from benchmarks.questions.peer import PeerRun
+from benchmarks.questions.trees_peer import run_trees
 from benchmarks.rows import Row
 from benchmarks.tasks import Rows, Task
 from coop_drake.answers import PlanningProblem
-from coop_drake.campaign.questions.ompl_peer import has_ompl
-from coop_drake.campaign.questions.path_check import fault_of
-from coop_drake.campaign.questions.peer import PeerRun
-from coop_drake.campaign.questions.trees_peer import run_trees
 
 __all__ = ["QUESTIONS", "Patience", "contradiction_rows", "contradiction_tasks"]
 

@@ -36,8 +36,8 @@ from pydrake.planning import (
 )
 from shapely.geometry.base import BaseGeometry
 
+from benchmarks.questions.trees_peer import run_trees
 from coop_drake.answers import PlanningProblem
-from coop_drake.campaign.questions.trees_peer import run_trees
 from coop_drake.tree import PlanarPose
 from coop_drake.tree.component_tree import ConvexShape, TreeJoint
 from coop_drake.tree.levers import configuration_scale

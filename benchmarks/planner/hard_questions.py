@@ -6,9 +6,9 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from benchmarks.planner.growth import growth_rows
+from benchmarks.questions.question import random_question
+from benchmarks.questions.settings import QuestionSettings
 from benchmarks.tasks import Rows, Task
-from coop_drake.campaign.questions.question import random_question
-from coop_drake.campaign.questions.settings import QuestionSettings
 
 __all__ = ["CAUSES", "hard_question_tasks"]
 

@@ -1,66 +1,72 @@
-"""The batches of a campaign: consecutive runs, questions or searches of one process, and of one file."""
+"""The batches of a campaign: consecutive pieces of work, such as runs, of one process and of one file."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from typing import Any, Literal, get_args
+from pkgutil import resolve_name
+from typing import Any, get_args
 
 from coop_drake.answers.digest import content_digest
-from coop_drake.campaign.plans import Plans, scenario_content, versions
-from coop_drake.campaign.questions.settings import QuestionSettings
-from coop_drake.campaign.records import QuestionRecord, Record, RunRecord
-from coop_drake.campaign.search.findings import BreakingPoint, Finding
+from coop_drake.campaign.plans import Plans, scenario_content
+from coop_drake.campaign.records import Record
 from coop_drake.campaign.settings import Tier
 from coop_drake.campaign.variation import Variation
-from coop_drake.typed_data import to_plain
 
-PLANNER: Literal["planner"] = "planner"
-SEARCH: Literal["search"] = "search"
-BREAKING: Literal["breaking"] = "breaking"
-"""In place of a tier: the batch has planning questions, searches or bisections in place of runs."""
+Task = tuple[Record, Callable[[], Record]]
+"""The record of a piece of work while it is done, and what does it."""
 
-SearchKind = Literal["search", "breaking"]
-"""Searches, or bisections of departures."""
+RUNS = "coop_drake.campaign.running.making:RUNS"
+"""The work of which campaigns consist."""
 
-_KINDS: dict[str, tuple[str, type[Record]]] = {
-    PLANNER: ("questions", QuestionRecord),
-    SEARCH: ("searches", Finding),
-    BREAKING: ("breaking", BreakingPoint),
-}
-"""The folder and the record of what is no run."""
+
+@dataclass(frozen=True)
+class Work:
+    """A kind of work that processes do batch by batch; programs may have kinds of their own.
+
+    Attributes:
+        folder: Name of the folder of its files, in that of the results.
+        record: What each piece of it leaves: a frozen dataclass of numbers and texts with a ``reason``.
+        tasks: Returns the pieces that an order asks for. It is given the fields of `Order`, with ``begin``
+            for the index of the first piece, and what is to be called now and then in pieces that take long.
+    """
+
+    folder: str
+    record: type[Record]
+    tasks: Callable[[dict[str, Any], Callable[[], None]], Iterator[Task]]
 
 
 @dataclass(frozen=True)
 class Batch:
-    """Consecutive runs of one scenario in one tier, planning questions, searches, or bisections.
+    """Consecutive runs of one scenario in one tier, or pieces of other work.
 
     Attributes:
-        scenario: Index of the scenario in its section of the campaign file; 0 for questions.
-        tier: By which loop runs are made; ``planner`` for questions, ``search`` for searches, ``breaking``
-            for bisections.
-        first: Index of the first run, question, search or departure.
+        scenario: Index of the scenario in its section of the file; 0 for work without any.
+        tier: By which loop runs are made; a name for other work.
+        first: Index of the first run or piece.
         stop: Index behind the last one.
         digest: SHA-256 of all that their results depend on; names their file.
+        work: Where the `Work` is, as ``module:name``.
     """
 
     scenario: int
-    tier: Tier | Literal["planner"] | SearchKind
+    tier: str
     first: int
     stop: int
     digest: str
+    work: str = RUNS
 
     @property
     def record(self) -> type[Record]:
-        """What each of its runs, questions or searches leaves."""
-        return _KINDS.get(self.tier, ("runs", RunRecord))[1]
+        """What each of its runs or pieces leaves."""
+        return work_of(self.work).record
 
     @property
     def file(self) -> Path:
-        """The file of its records, in the campaign's folder."""
-        return Path(_KINDS.get(self.tier, ("runs", RunRecord))[0]) / f"{self.digest}.parquet"
+        """The file of its records, in the folder of the results."""
+        return Path(work_of(self.work).folder) / f"{self.digest}.parquet"
 
     @property
     def costs(self) -> Path:
@@ -68,17 +74,10 @@ class Batch:
         return Path("costs") / f"{self.digest}.json"
 
 
-def question_batches(settings: QuestionSettings) -> Iterator[Batch]:
-    """Yield all batches of planning questions."""
-    for first in range(0, settings.count, settings.batch):
-        yield question_batch(settings, first, min(first + settings.batch, settings.count))
-
-
-def question_batch(settings: QuestionSettings, first: int, stop: int) -> Batch:
-    """Return one batch of planning questions; what it leaves does not depend on how many others there are."""
-    asked = to_plain(replace(settings, count=1, batch=1), QuestionSettings)
-    content = {"questions": asked, "versions": versions(), "first": first, "stop": stop}
-    return Batch(0, PLANNER, first, stop, content_digest(content))
+def work_of(name: str) -> Work:
+    """Return a kind of work by its place, as ``module:name``."""
+    found: Work = resolve_name(name)
+    return found
 
 
 class Batching:

@@ -12,8 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from coop_drake.campaign.batches import Batch
 from coop_drake.campaign.plans import source_digest
-from coop_drake.campaign.records import QuestionRecord, Record, RunRecord, schema_of, table_of
-from coop_drake.campaign.search.findings import BreakingPoint, Finding
+from coop_drake.campaign.records import Record, RunRecord, schema_of, table_of
 from coop_drake.errors import CoopDrakeError
 from coop_drake.files import write_atomically
 
@@ -40,11 +39,6 @@ class CampaignFolder:
     def plans(self) -> Path:
         """The plans that runs follow, named by digests."""
         return self.path / "plans"
-
-    @property
-    def cases(self) -> Path:
-        """Questions that were answered wrongly or not at all."""
-        return self.path / "cases"
 
     @property
     def lock(self) -> Path:
@@ -75,18 +69,10 @@ class CampaignFolder:
 
     def table(self, batches: Sequence[Batch]) -> pyarrow.Table:
         """Return the records of those batches of runs that are there, sorted by run and tier."""
-        return self._records(batches, RunRecord).sort_by([("run", "ascending"), ("tier", "ascending")])
+        return self.records(batches, RunRecord).sort_by([("run", "ascending"), ("tier", "ascending")])
 
-    def questions(self, batches: Sequence[Batch]) -> pyarrow.Table:
-        """Return the records of those batches of questions that are there, sorted by number."""
-        return self._records(batches, QuestionRecord).sort_by("question")
-
-    def findings(self, batches: Sequence[Batch]) -> tuple[list[Finding], list[BreakingPoint]]:
-        """Return what searches and bisections have found, as far as they are there, in their order."""
-        found, points = (self._records(batches, kind).to_pylist() for kind in (Finding, BreakingPoint))
-        return [Finding(**row) for row in found], [BreakingPoint(**row) for row in points]
-
-    def _records(self, batches: Sequence[Batch], kind: type[Record]) -> pyarrow.Table:
+    def records(self, batches: Sequence[Batch], kind: type[Record]) -> pyarrow.Table:
+        """Return the records of one kind that are there, batch by batch."""
         import pyarrow
 
         mine = [one for one in batches if one.record is kind]
@@ -100,7 +86,7 @@ class CampaignFolder:
         try:
             return pyarrow.parquet.read_table(file)
         except (OSError, pyarrow.ArrowInvalid) as error:
-            again = "remove it, and `coop-drake campaign` makes its runs again"
+            again = "remove it, and the same command makes its runs again"
             raise CoopDrakeError(f"{file} is damaged ({' '.join(str(error).split())}); {again}") from error
 
     def costs(self, batches: Iterable[Batch]) -> list[dict[str, Any]]:
@@ -112,7 +98,7 @@ class CampaignFolder:
         return known
 
     def cpu_seconds(self, batches: Iterable[Batch]) -> float:
-        """Return the mean processor time of a run, question or search with its share of starting, or NaN."""
+        """Return the mean processor time of a run or piece of work with its share of starting, or NaN."""
         costs = self.costs(batches)
         counted = sum(entry["runs"] for entry in costs)
         return sum(entry["cpu_seconds"] for entry in costs) / counted if counted else nan

@@ -5,13 +5,10 @@ from __future__ import annotations
 import dataclasses
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from coop_drake.campaign.distributions import Count, Distribution
 from coop_drake.campaign.keys import Plain, Seed, check_keys
-from coop_drake.campaign.questions.settings import QuestionSettings
-from coop_drake.campaign.search.settings import Breaking, Searches
-from coop_drake.errors import ScenarioError
 from coop_drake.scenario.reading import read_file
 from coop_drake.typed_data import DataError, Limits, Positive
 
@@ -34,7 +31,7 @@ class Runs:
         tier: ``drake`` for the loop of Drake's systems, ``compiled`` for the compiled loop, ``both`` for
             every run in each of them.
         paired: With ``compiled``, how many of the first runs of every scenario are made by Drake's loop,
-            too, so that the report can say how far the tiers differ.
+            too.
         budget: Under which budget the plans must provably hold, as ``plan --budget`` takes it, a file
             relative to the campaign file if it is there; null for what every scenario requires.
         batch: Runs that one process makes, and one file holds; null for 20 of Drake's loop, and 2000 of the
@@ -76,23 +73,34 @@ class Runs:
         check_keys(self.set, vary=self.vary, grid=self.grid)
 
 
+_STUDIES = ("questions", "searches", "breaking")
+"""Sections of files that the benchmarks read."""
+
+
 @dataclass(frozen=True)
 class Campaign:
-    """What a campaign does; it has at least one section.
+    """What a campaign does.
 
     Attributes:
-        runs: Runs of transports; null for none.
-        questions: Random planning questions; null for none.
-        searches: Searches for runs with small margins; null for none.
-        breaking: Multiples of a budget at which runs are first lost; null for none.
+        runs: Runs of transports.
         path: The file it was read from.
     """
 
-    runs: Runs | None = None
-    questions: QuestionSettings | None = None
-    searches: Searches | None = None
-    breaking: Breaking | None = None
+    runs: Runs
     path: Path = field(default=Path("campaign.yaml"), metadata={"in_file": False})
+
+    @staticmethod
+    def completed(content: dict[str, Any], key: str) -> dict[str, Any]:
+        """Refuse sections of studies by the command that knows them.
+
+        Raises:
+            DataError: There is one.
+        """
+        for name in _STUDIES:
+            if name in content:
+                known = "`python -m benchmarks study FILE`, in a clone of the repository"
+                raise DataError(name, content[name], f"runs alone; others are for {known}")
+        return content
 
     @property
     def name(self) -> str:
@@ -111,7 +119,4 @@ def load_campaign(path: Path | str, original: Path | None = None) -> Campaign:
         ScenarioError: With file, key, value and what is allowed there.
     """
     file = Path(path)
-    campaign = dataclasses.replace(read_file(Campaign, file), path=original or file)
-    if campaign == Campaign(path=campaign.path):
-        raise ScenarioError(str(file), "the file", "no section", "at least one section, runs or questions")
-    return campaign
+    return dataclasses.replace(read_file(Campaign, file), path=original or file)

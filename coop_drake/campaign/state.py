@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 
 from coop_drake.campaign.batches import Batch
-from coop_drake.campaign.records import RunRecord
 from coop_drake.campaign.results import CampaignFolder
 from coop_drake.campaign.settings import Campaign
 from coop_drake.campaign.variation import Variation
@@ -62,7 +61,7 @@ class State:
 def state_of(campaign: Campaign, folder: CampaignFolder, batches: Sequence[Batch]) -> tuple[State, ...]:
     """Return the state of every scenario and tier that a campaign has runs of."""
     rows = []
-    for key in dict.fromkeys((batch.scenario, batch.tier) for batch in batches if batch.record is RunRecord):
+    for key in dict.fromkeys((batch.scenario, batch.tier) for batch in batches):
         mine = [batch for batch in batches if (batch.scenario, batch.tier) == key]
         table = folder.table(mine)
         column = {name: table.column(name).to_numpy() for name in _COLUMNS}

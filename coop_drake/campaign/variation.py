@@ -76,7 +76,6 @@ class Variation:
     """
 
     def __init__(self, campaign: Campaign, section: str = "runs") -> None:
-        assert campaign.runs is not None  # the caller has looked
         self.campaign, self._section = campaign, section
         self.runs: Runs = campaign.runs
         self.files = [self._file(name) for name in self.runs.scenarios]

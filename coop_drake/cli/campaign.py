@@ -3,20 +3,28 @@
 from __future__ import annotations
 
 import shlex
+from dataclasses import fields
+from math import isnan, nan
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from rich.markup import escape
 
-from coop_drake.cli.campaign_state import show_state
 from coop_drake.cli.options import FirstByDefault, Machine, NoFigures, Quiet, out_folder
-from coop_drake.cli.reporter import ExitCode, reporting
+from coop_drake.cli.reporter import ExitCode, Reporter, reporting
+from coop_drake.cli.results import ResultFolder
+from coop_drake.cli.run import carry_out, simulation_of
+from coop_drake.cli.task import Task
+from coop_drake.errors import ProcessError
+from coop_drake.viz.drawing_processes import DrawingProcesses
 
 if TYPE_CHECKING:
-    from coop_drake.campaign import Campaign
+    from coop_drake.campaign import Campaign, RunRecord
     from coop_drake.campaign.batches import Batch
     from coop_drake.campaign.results import CampaignFolder
+    from coop_drake.campaign.settings import Tier
+    from coop_drake.diagram import Blocks
 
 EXAMPLES = (
     ("campaign many.campaign.yaml", "make all runs, or those that are missing, into out/campaigns/many/"),
@@ -25,6 +33,11 @@ EXAMPLES = (
     ("campaign replay many.campaign.yaml 17", "one of its runs again, with recording and figures"),
 )
 
+
+_LOOPS = {"drake": "Drake's loop", "compiled": "the compiled loop"}
+
+_NAMES = "run", "scenario", "tier", "seed", "values", "digest", "blocks"
+"""Columns of a record that say which run it is, not what it left."""
 
 campaign_app = typer.Typer(
     cls=FirstByDefault,
@@ -61,9 +74,9 @@ def run_command(
     machine: Machine = False,
     quiet: Quiet = False,
 ) -> None:
-    """Make all runs of a campaign and answer its questions, or those that an interruption left.
+    """Make all runs of a campaign, or those that an interruption left.
 
-    `campaign FILE` means the same. The exit code is 1 if a run was lost or an answer is wrong.
+    `campaign FILE` means the same. The exit code is 1 if a run was lost.
     """
     with reporting(machine=machine, quiet=quiet) as reporter:
         campaign, folder = _read(file, out)
@@ -74,7 +87,7 @@ def run_command(
                 campaign, folder.path, workers=workers, scheduler=scheduler, progress=progress
             )
         reporter.facts["batches_made"] = outcome.made
-        show_state(campaign, folder, outcome.batches, reporter)
+        _show_state(campaign, folder, outcome.batches, reporter)
 
 
 @campaign_app.command("status")
@@ -84,7 +97,7 @@ def status_command(
     """Show how far a campaign is, and what it has found so far."""
     with reporting(machine=machine, quiet=quiet) as reporter:
         campaign, folder, batches = _with_batches(file, out)
-        show_state(campaign, folder, batches, reporter)
+        _show_state(campaign, folder, batches, reporter)
         reporter.code = ExitCode.DONE
 
 
@@ -97,14 +110,10 @@ def report_command(
         from coop_drake.campaign.report import make_report, write_report
 
         campaign, folder, batches = _with_batches(file, out)
-        findings, breaking = folder.findings(batches)
         report = make_report(
             campaign.name,
             folder.table(batches),
-            folder.questions(batches),
             facts=_facts(campaign, folder.by_other_sources(batches)),
-            findings=findings,
-            breaking=breaking,
             missing=len(folder.missing(batches)),
         )
         at = [] if out is None else ["--out", str(out)]
@@ -128,31 +137,8 @@ def replay_command(
     A run of the compiled tier is made again by the compiled loop, too.
     """
     with reporting(machine=machine, quiet=quiet) as reporter:
-        from coop_drake.cli.campaign_replay import replay
-
         campaign, folder, batches = _with_batches(file, out)
-        reporter.code = replay(campaign, folder, batches, run, reporter, figures=not no_figures)
-
-
-@campaign_app.command("question")
-def question_command(
-    file: CampaignFile,
-    number: Annotated[int, typer.Argument(metavar="NUMBER", min=0, help="Number of the question.")],
-    out: CampaignOut = None,
-    machine: Machine = False,
-    quiet: Quiet = False,
-) -> None:
-    """Write a random question as a scenario with its models, to be planned or looked at like any other."""
-    with reporting(machine=machine, quiet=quiet) as reporter:
-        from coop_drake.campaign.questions import random_question
-        from coop_drake.errors import ScenarioError
-
-        campaign, folder = _read(file, out)
-        if campaign.questions is None:
-            raise ScenarioError(str(file), "questions", None, "a section of questions")
-        drawn = random_question(campaign.questions, number, folder.path / "drawn" / str(number))
-        reporter.facts["scenario"] = str(drawn.scenario.path)
-        reporter.say(f"Next: coop-drake plan {escape(str(drawn.scenario.path))}")
+        reporter.code = _replay(campaign, folder, batches, run, reporter, figures=not no_figures)
 
 
 def _read(file: Path, out: Path | None) -> tuple[Campaign, CampaignFolder]:
@@ -169,9 +155,8 @@ def _facts(campaign: Campaign, by_other_sources: int) -> list[tuple[str, str]]:
     from importlib.metadata import version
 
     facts = [("file", campaign.path.name), ("coop_drake", version("coop-drake")), ("Drake", version("drake"))]
-    if campaign.runs is not None:
-        facts += [("seed", str(campaign.runs.seed)), ("varied keys", str(len(campaign.runs.vary)))]
-        facts += [("budget", campaign.runs.budget)] if campaign.runs.budget else []
+    facts += [("seed", str(campaign.runs.seed)), ("varied keys", str(len(campaign.runs.vary)))]
+    facts += [("budget", campaign.runs.budget)] if campaign.runs.budget else []
     if by_other_sources:
         facts += [("batches by other sources of coop_drake", str(by_other_sources))]
     return facts
@@ -182,3 +167,122 @@ def _with_batches(file: Path, out: Path | None) -> tuple[Campaign, CampaignFolde
 
     campaign, folder = _read(file, out)
     return campaign, folder, batches_of(campaign, folder)
+
+
+def _show_state(
+    campaign: Campaign, folder: CampaignFolder, batches: tuple[Batch, ...], reporter: Reporter
+) -> None:
+    """Show what a campaign has come to so far; a lost run makes the command fail."""
+    from coop_drake.campaign.state import state_of
+
+    rows = state_of(campaign, folder, batches)
+    reporter.facts.update(
+        folder=str(folder.path),
+        runs=sum(row.runs for row in rows),
+        done=sum(row.done for row in rows),
+        lost=sum(row.lost for row in rows),
+        rows=[row.facts() for row in rows],
+    )
+    margins = "funnel\n(rad)", "clearance\n(m)", "of\nbudget"
+    headings = ("runs", "done", "lost", *margins, "CPU\n(s)")  # Rows fit into 80 columns.
+    title = f"{campaign.name}: least margins, largest share of the budget"
+    reporter.table(title, [row.cells() for row in rows], headings, "scenario, tier")
+    if reporter.facts["lost"]:
+        reporter.code = ExitCode.FAILED_RUN
+    if others := folder.by_other_sources(batches):
+        reporter.facts["batches_by_other_sources"] = others
+        reporter.say(
+            f"{others} of the batches were made by other sources of coop_drake than those of this command; "
+            "with a new folder for --out they are made again"
+        )
+    reporter.say(f"All results are in {escape(str(folder.path))}")
+
+
+def _replay(
+    campaign: Campaign,
+    folder: CampaignFolder,
+    batches: tuple[Batch, ...],
+    index: int,
+    reporter: Reporter,
+    *,
+    figures: bool,
+) -> ExitCode:
+    """Make a run again by Drake's loop, with recording and figures, below the campaign's folder.
+
+    A run of the compiled tier is made again by the compiled loop, too.
+
+    Raises:
+        ScenarioError: There is no such run.
+        ProcessError: The run differs from the one that was counted.
+    """
+    from coop_drake.answers.log import SimulationLog
+    from coop_drake.answers.plan_file import plan_digest
+    from coop_drake.campaign.measuring import record_of_log
+    from coop_drake.campaign.plans import Plans
+    from coop_drake.campaign.running.making import RunMaker, run_digest
+    from coop_drake.campaign.variation import Variation
+    from coop_drake.plant import planning_problem
+
+    variation = Variation(campaign)
+    run = variation.run(index)
+    scenario = variation.scenario_of(run)
+    plans = Plans(variation, folder.plans)
+    plan = plans.plan_of(run)
+    reporter.note(scenario.workspace.notes)
+    task = Task(scenario, planning_problem(scenario))
+    results = ResultFolder.of(task.name, folder.path / "replays" / str(index), "simulation")
+    counted = _counted(index, "drake", folder, batches)
+    blocks: Blocks = "fused" if counted and counted["blocks"] == "fused" else "named"
+    simulation = simulation_of(task, blocks, reporter)
+    with DrawingProcesses(figures=figures) as drawing:
+        code = carry_out(task, plan, results, reporter, drawing, None, simulation, fresh_maps=False)
+    log = SimulationLog.load(results.path / "log.npz")
+    digest = run_digest(scenario, plan_digest(plan), "drake")
+    drake = record_of_log(run, scenario.name, log, plan, digest, blocks)
+    reporter.facts.update(run=index, counted=False)
+    _compare(drake, counted, reporter)
+    if any(one.tier == "compiled" and one.first <= index < one.stop for one in batches):
+        compiled = RunMaker(variation, plans, "compiled", folder.path / "logs").record(run)
+        _show_both(drake, compiled, reporter)
+        _compare(compiled, _counted(index, "compiled", folder, batches), reporter)
+    return code
+
+
+def _counted(
+    index: int, tier: Tier, folder: CampaignFolder, batches: tuple[Batch, ...]
+) -> dict[str, Any] | None:
+    """Return the record of a run in a tier, None if it was not counted."""
+    mine = [one for one in batches if one.tier == tier and one.first <= index < one.stop]
+    return next((row for row in folder.table(mine).to_pylist() if row["run"] == index), None)
+
+
+def _compare(again: RunRecord, counted: dict[str, Any] | None, reporter: Reporter) -> None:
+    loop = _LOOPS[again.tier]
+    if not counted:
+        reporter.say(f"Run {again.run} was not counted by {loop}; values and seed are those of any tier")
+        return
+    reporter.facts["counted"] = True
+    differing = [name for name, value in counted.items() if not _same(value, getattr(again, name))]
+    if differing:
+        what = ", ".join(differing)
+        raise ProcessError(f"run {again.run} of {loop} differs from the one that was counted in {what}")
+    reporter.say(f"Run {again.run} of {loop} is the one that was counted, to the last bit")
+
+
+def _show_both(drake: RunRecord, compiled: RunRecord, reporter: Reporter) -> None:
+    """Show what a run left in both loops, and the differences of its numbers."""
+    rows, facts = [], {}
+    for name in (one.name for one in fields(drake) if one.name not in _NAMES):
+        first, second = getattr(drake, name), getattr(compiled, name)
+        facts[name] = [None if _same(value, nan) else value for value in (first, second)]
+        numbers = isinstance(first, float) and isinstance(second, float)
+        texts = [f"{value:.9g}" if isinstance(value, float) else str(value) for value in (first, second)]
+        rows.append((name, *texts, f"{second - first:.2g}" if numbers else ""))
+    reporter.facts["tiers"] = facts
+    headings = "Drake's loop", "the compiled loop", "difference"
+    reporter.table(f"Run {drake.run}", rows, headings, "column")
+
+
+def _same(first: Any, second: Any) -> bool:
+    both = isinstance(first, float) and isinstance(second, float)
+    return first == second or (both and isnan(first) and isnan(second))

@@ -6,20 +6,21 @@ import pytest
 import typer
 
 from benchmarks.campaigns import __main__ as campaigns
+from benchmarks.searches.findings import BreakingPoint
+from benchmarks.study import batches_of, load_study
 from coop_drake.campaign import load_campaign
 from coop_drake.campaign.results import CampaignFolder
-from coop_drake.campaign.running.command import batches_of
-from coop_drake.campaign.search import BreakingPoint
 
-FILES = sorted(Path(campaigns.__file__).parent.glob("*.campaign.yaml"))
+FILES = sorted(Path(campaigns.__file__).parent.glob("*.yaml"))
 
 
 def test_every_campaign_of_the_folder_is_made_and_can_be_read():
-    assert sorted(campaigns.NAMES) == [load_campaign(file).name for file in FILES]
+    read = [load_study(file) if ".study." in file.name else load_campaign(file) for file in FILES]
+    assert sorted(campaigns.NAMES) == sorted(one.name for one in read)
 
 
 def test_what_is_there_is_shown_as_a_table(tmp_path, capsys):
-    campaign = load_campaign(next(file for file in FILES if file.name.startswith("breaking")))
+    campaign = load_study(next(file for file in FILES if file.name.startswith("breaking")))
     folder = CampaignFolder(tmp_path / "breaking")
     batches = batches_of(campaign, folder)
     for batch, kept, lost in ((batches[0], 2.0, 2.25), (batches[8], 64.0, float("inf"))):

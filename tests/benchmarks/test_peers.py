@@ -7,12 +7,12 @@ from benchmarks.planner.family import corridor_problem, first_question
 from benchmarks.planner.gcs_peer import run_gcs
 from benchmarks.planner.guarantees import guarantee_table
 from benchmarks.planner.head_to_head import judged
+from benchmarks.questions.footprint import free_goals, prepared_check
+from benchmarks.questions.ompl_peer import run_ompl
+from benchmarks.questions.path_check import fault_of
+from benchmarks.questions.peer import PeerRun
+from benchmarks.questions.trees_peer import run_trees
 from benchmarks.rows import Row
-from coop_drake.campaign.questions.footprint import free_goals, prepared_check
-from coop_drake.campaign.questions.ompl_peer import run_ompl
-from coop_drake.campaign.questions.path_check import fault_of
-from coop_drake.campaign.questions.peer import PeerRun
-from coop_drake.campaign.questions.trees_peer import run_trees
 
 EASY = first_question()
 STILL = np.zeros((0, 5))

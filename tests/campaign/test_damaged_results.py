@@ -2,17 +2,17 @@
 
 import pytest
 
-from coop_drake.campaign.batches import BREAKING, Batch
+from coop_drake.campaign.batches import Batch
+from coop_drake.campaign.records import RunRecord
 from coop_drake.campaign.results import CampaignFolder
-from coop_drake.campaign.search import BreakingPoint
 from coop_drake.errors import CoopDrakeError
 
 
 @pytest.fixture
 def folder_and_batch(tmp_path):
-    folder, batch = CampaignFolder(tmp_path), Batch(0, BREAKING, 0, 2, "0" * 64)
-    point = BreakingPoint("base", "compiled", "lag", 0.005, 5.0, 5.5, 4, "left its cell")
-    folder.write(batch, [point, point])
+    folder, batch = CampaignFolder(tmp_path), Batch(0, "compiled", 0, 2, "0" * 64)
+    run = RunRecord(0, "base", "compiled", 1, "{}", False, "left its cell")
+    folder.write(batch, [run, run])
     return folder, batch
 
 
@@ -24,7 +24,7 @@ def test_a_file_that_is_damaged_inside_is_named_with_what_to_do(folder_and_batch
     file.write_bytes(content)
     assert folder.has(batch)
     with pytest.raises(CoopDrakeError, match=r"0\.parquet is damaged \(.*\); remove it, and"):
-        folder.findings([batch])
+        folder.table([batch])
 
 
 def test_a_file_without_its_end_counts_as_missing(folder_and_batch):

@@ -22,14 +22,13 @@ from coop_drake.campaign.plans import Plans
 from coop_drake.campaign.results import CampaignFolder, write_table
 from coop_drake.campaign.running import Order, make_batch, supervising
 from coop_drake.campaign.running.making import RunMaker
-from coop_drake.campaign.search.searching import Searching
 from coop_drake.campaign.settings import load_campaign
 from coop_drake.campaign.variation import Variation
 from coop_drake.errors import ProcessError
 from tests.support.processes import kill, processes, waited_for
 from tests.support.scenarios import write_scenario
 
-RUNS, BATCH, SEARCHED = 8, 2, 2
+RUNS, BATCH = 12, 2
 FILE = f"""
 runs:
   scenarios: [room.scenario.yaml]
@@ -38,14 +37,6 @@ runs:
   blocks: fused
   vary:
     deployment.mass_error: !Uniform {{min: -0.1, max: 0.1}}
-searches:
-  scenarios: [room.scenario.yaml]
-  set: {{deployment.preset: mobile_base}}
-  budget: all
-  count: {SEARCHED}
-  evaluations: 6
-  tier: compiled
-  batch: 1
 """
 PATIENCE = 300.0
 """Longest that a command is waited for [s]; machines are busy where tests run."""
@@ -60,30 +51,25 @@ main()
 
 
 class Undisturbed:
-    """A campaign whose runs and searches were made one after another in this process, and its files."""
+    """A campaign whose runs were made one after another in this process, and its files."""
 
     def __init__(self, folder: Path) -> None:
         write_scenario(folder / "room.scenario.yaml")
         self.file = folder / "room.campaign.yaml"
         self.file.write_text(FILE)
-        campaign = load_campaign(self.file)
-        self.variation = Variation(campaign)
+        self.variation = Variation(load_campaign(self.file))
         self.folder = CampaignFolder(folder / "undisturbed")
         self.plans = Plans(self.variation, self.folder.plans)
         maker = RunMaker(self.variation, self.plans, "drake", folder / "logs")
-        searching = Searching(campaign, self.folder, "search", 0)
-        self.batches = *Batching(self.variation, self.plans).batches(), *searching.batches()
+        self.batches = tuple(Batching(self.variation, self.plans).batches())
         for batch in self.batches:
-            indices = range(batch.first, batch.stop)
-            if batch.tier == "search":
-                self.folder.write(batch, map(searching.record, indices))
-            else:
-                self.folder.write(batch, map(maker.record, map(self.variation.run, indices)))
+            self.folder.write(
+                batch, map(maker.record, map(self.variation.run, range(batch.first, batch.stop)))
+            )
 
     def files(self, folder: CampaignFolder) -> dict[str, bytes]:
-        """What a folder holds of runs and searches."""
-        paths = (path for kind in ("runs", "searches", "found") for path in folder.path.glob(f"{kind}/*"))
-        return {path.name: path.read_bytes() for path in paths}
+        """What a folder holds of runs."""
+        return {path.name: path.read_bytes() for path in folder.path.glob("runs/*")}
 
     def missing(self, folder: CampaignFolder) -> bool:
         """Whether batches are to be made yet; those that are there are as they should be."""
@@ -127,9 +113,9 @@ def sorted_bytes(folder, campaign):
     return path.read_bytes()
 
 
-def child_of(folder, *, but=(), making=""):
+def child_of(folder, *, but=()):
     """A process that makes runs for a folder, when there is one."""
-    return waited_for(lambda: [p for p in processes(CHILD, str(folder), making) if p.pid not in but])[0]
+    return waited_for(lambda: [p for p in processes(CHILD, str(folder)) if p.pid not in but])[0]
 
 
 def ended(command, folder, number):
@@ -142,7 +128,7 @@ def ended(command, folder, number):
 
 @pytest.mark.slow
 def test_a_campaign_that_is_disturbed_in_every_way_ends_as_one_that_is_not(undisturbed, begun):
-    folder = CampaignFolder(undisturbed.folder.path.with_name("disturbed"))  # searches write relative paths
+    folder = CampaignFolder(undisturbed.folder.path.with_name("disturbed"))
     undisturbed.order(folder.path)  # The plans are there: they would not fit where a disk is full.
 
     small = {"preexec_fn": lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (5000, resource.RLIM_INFINITY))}
@@ -172,9 +158,7 @@ def test_a_campaign_that_is_disturbed_in_every_way_ends_as_one_that_is_not(undis
     assert undisturbed.missing(folder)
 
     third = begun(folder.path, "--workers", 1)
-    child = child_of(folder.path, making='"search"')
-    kill(child.pid)
-    child_of(folder.path, but=[child.pid], making='"search"')
+    child_of(folder.path)
     kill(third.pid)
     third.communicate()
     waited_for(lambda: not processes(str(folder.path)))
@@ -190,7 +174,7 @@ def test_a_campaign_that_is_disturbed_in_every_way_ends_as_one_that_is_not(undis
     facts = json.loads(said)
     assert (facts["done"], facts["lost"]) == (RUNS, 0)
     assert undisturbed.files(folder) == undisturbed.files(undisturbed.folder)
-    assert len(undisturbed.files(folder)) == RUNS // BATCH + 2 * SEARCHED
+    assert len(undisturbed.files(folder)) == RUNS // BATCH
     assert sorted_bytes(folder, undisturbed) == sorted_bytes(undisturbed.folder, undisturbed)
 
 

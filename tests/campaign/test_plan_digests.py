@@ -6,12 +6,15 @@ from pathlib import Path
 
 import pytest
 import yaml
+from typer.testing import CliRunner
 
+from benchmarks.app import app
+from benchmarks.searches.searching import Searching
+from benchmarks.study import load_study
 from coop_drake.answers.plan_file import plan_digest
 from coop_drake.campaign import plans
 from coop_drake.campaign.plans import Plans, _planned, scenario_content
 from coop_drake.campaign.results import CampaignFolder
-from coop_drake.campaign.search.searching import Searching
 from coop_drake.campaign.settings import load_campaign
 from coop_drake.campaign.variation import Variation
 from coop_drake.scenario.load import load_scenario
@@ -78,12 +81,14 @@ def test_an_edited_budget_asks_for_another_plan(tmp_path):
     write_scenario(tmp_path / "room.scenario.yaml")
     asked = {"scenarios": ["room.scenario.yaml"], "budget": "own.budget.yaml"}
     file, budget = tmp_path / "room.campaign.yaml", tmp_path / "own.budget.yaml"
-    file.write_text(yaml.safe_dump({"runs": {**asked, "count": 1}, "searches": asked}))
-    campaign, folder = load_campaign(file), CampaignFolder(tmp_path)
+    file.write_text(yaml.safe_dump({"runs": {**asked, "count": 1}}))
+    study = tmp_path / "room.study.yaml"
+    study.write_text(yaml.safe_dump({"searches": asked}))
+    campaign, searches, folder = load_campaign(file), load_study(study), CampaignFolder(tmp_path)
 
     def digests():
         variation = Variation(campaign)
-        searching = Searching(campaign, folder, "search", 0)
+        searching = Searching(searches, folder, "search", 0)
         return Plans(variation, tmp_path).digest_of(variation.run(0)), searching.trials.digest
 
     budget.write_text("{delay: 0.0}")
@@ -101,7 +106,10 @@ def test_a_budget_without_a_file_is_refused_with_its_key(section, tmp_path):
     asked = {"scenarios": ["room.scenario.yaml"], "budget": "nowhere.yaml"}
     file = tmp_path / "room.campaign.yaml"
     file.write_text(yaml.safe_dump({section: {**asked, "count": 1} if section == "runs" else asked}))
-    result = invoke("campaign", "status", file, "--out", tmp_path / "out")
+    if section == "runs":
+        result = invoke("campaign", "status", file, "--out", tmp_path / "out")
+    else:
+        result = CliRunner().invoke(app, ["study", str(file), "--status", "--out", str(tmp_path / "out")])
     assert result.exit_code == 2
     assert f"{section}.budget: 'nowhere.yaml' is not allowed" in result.stderr
 
@@ -110,9 +118,8 @@ def test_what_a_search_finds_names_the_budget_from_its_own_folder(tmp_path):
     write_scenario(tmp_path / "room.scenario.yaml")
     (tmp_path / "own.budget.yaml").write_text("{}")
     asked = {"scenarios": ["room.scenario.yaml"], "budget": "own.budget.yaml"}
-    (tmp_path / "room.campaign.yaml").write_text(yaml.safe_dump({"searches": asked}))
-    campaign = load_campaign(tmp_path / "room.campaign.yaml")
-    trials = Searching(campaign, CampaignFolder(tmp_path), "search", 0).trials
+    (tmp_path / "room.study.yaml").write_text(yaml.safe_dump({"searches": asked}))
+    trials = Searching(load_study(tmp_path / "room.study.yaml"), CampaignFolder(tmp_path), "search", 0).trials
     found = load_campaign(trials.write_found({}, tmp_path / "found" / "room_0.campaign.yaml"))
     assert found.runs.budget == "../own.budget.yaml"
     assert Path(Variation(found).budget).resolve() == (tmp_path / "own.budget.yaml").resolve()

@@ -9,7 +9,9 @@ from math import inf, nan
 import numpy as np
 import pytest
 import yaml
+from typer.testing import CliRunner
 
+from benchmarks.app import app
 from coop_drake.campaign.plans import Plans
 from coop_drake.campaign.running.making import RunMaker
 from coop_drake.campaign.settings import load_campaign
@@ -31,8 +33,13 @@ def file_of(folder, **sections):
 
 
 def refused(folder, command="run", *arguments, **sections):
-    """What a command says of a campaign that it refuses."""
-    result = invoke("campaign", command, file_of(folder, **sections), *arguments, "--out", folder / "out")
+    """What a command says of a campaign, or of a study, that it refuses."""
+    file, out = file_of(folder, **sections), ("--out", folder / "out")
+    if "runs" in sections:
+        result = invoke("campaign", command, file, *arguments, *out)
+    else:
+        words = ["study", file, *(["--status"] if command == "status" else []), *out]
+        result = CliRunner().invoke(app, list(map(str, words)))
     assert result.exit_code == 2, result.stderr
     assert not list((folder / "out").glob("runs/*"))
     return result.stderr
@@ -110,9 +117,13 @@ def test_a_budget_with_more_than_can_be_simulated_has_no_breaking_points(tmp_pat
     assert "breaking.budget: " in refused(tmp_path, breaking=section)
 
 
-def test_a_file_without_runs_has_none_to_replay(tmp_path):
-    said = refused(tmp_path, "replay", 0, questions={"count": 1})
-    assert "runs: None is not allowed; expected a section of runs" in said
+@pytest.mark.parametrize("name", ["questions", "searches", "breaking"])
+def test_a_study_is_refused_by_the_name_of_its_command(name, tmp_path):
+    said = refused(tmp_path, runs={**ROOM, "count": 1}, **{name: {}})
+    assert (
+        f"{name}: {{}} is not allowed; expected runs alone; others are for `python -m benchmarks study"
+        in said
+    )
 
 
 @pytest.mark.parametrize(

@@ -1,19 +1,20 @@
+"""The report of a campaign: rates, distributions, worst runs; results that are few, equal, lost or made twice."""
+
 import json
-from dataclasses import replace
 from html.parser import HTMLParser
-from math import inf, isnan
+from math import isnan
 
 import numpy as np
 import pyarrow as pa
 import pytest
 from scipy.stats import beta, binom
 
-from coop_drake.campaign.records import QuestionRecord, table_of
+from coop_drake.campaign.records import RunRecord, table_of
 from coop_drake.campaign.report import make_report, write_report
+from coop_drake.campaign.report.distributions import distribution
+from coop_drake.campaign.report.figures import distributions_svg
 from coop_drake.campaign.report.page import headline, render_page, verdict
 from coop_drake.campaign.report.rates import loss_rate, percent_up
-from coop_drake.campaign.report.searches import summarise_searches
-from coop_drake.campaign.search import BreakingPoint, Finding
 from tests.support.campaign_table import run_table
 
 
@@ -76,24 +77,6 @@ def test_distributions_are_those_of_the_columns(both_tiers):
     assert {group.reasons for group in both_tiers.groups} == {(), (("left the funnel of the angle", 1),)}
 
 
-def test_the_fault_that_takes_the_margin_is_found_and_no_other(both_tiers):
-    clear = {(one.key, one.measure): one for one in both_tiers.influences if one.clear}
-    assert list(clear) == [("deployment.mass_error", "funnel_margin")]
-    (found,) = clear.values()
-    assert found.worst > 0.1
-    assert found.chance < 1e-10
-    assert found.taken == pytest.approx(0.0075 * (found.values[-1] - found.values[0]), rel=0.1)
-
-
-def test_tiers_are_compared_run_by_run(both_tiers):
-    rows = {(row["run"], row["tier"]): row for row in run_table(300, tiers=("drake", "compiled")).to_pylist()}
-    base, tight = both_tiers.agreements
-    assert (base.scenario, base.pairs, base.verdicts, tight.verdicts) == ("base", 150, 0, 0)
-    differences = [abs(rows[i, "drake"]["time"] - rows[i, "compiled"]["time"]) for i in range(0, 300, 2)]
-    assert base.largest["time"] == pytest.approx(max(differences))
-    assert make_report("one tier", run_table(10)).agreements == ()
-
-
 def test_lost_runs_come_first_among_the_worst_and_the_smallest_share_next(both_tiers):
     lost = [run for run in both_tiers.worst if not run.arrived]
     assert [run.run for run in both_tiers.worst[:2]] == [run.run for run in lost] == [7, 7]
@@ -113,10 +96,6 @@ def test_a_run_that_used_more_than_the_budget_states_is_told_first():
     assert headline(report).endswith("1 run used more than the budget states, up to 107 % of it.")
     assert verdict(report) == "some"
     assert 'class="headline some"' in render_page(report, replay)
-    found = Finding("base", "compiled", 1, 10, "budget_share", 0.4, 1.2, arrived=True)
-    searched = make_report("searches", findings=[found])
-    assert headline(searched).endswith("1 search used more than the budget states, up to 120 % of it.")
-    assert verdict(searched) == "some"
     assert verdict(make_report("lost", run_table(60, lost=(3,)))) == "bad"
 
 
@@ -130,62 +109,6 @@ def test_a_tier_without_a_column_leaves_it_empty():
     assert "nan" not in render_page(report, replay)
 
 
-def questions():
-    rows = [("corridor", "plan", True, False), ("corridor", "infeasible", True, True),
-            ("corridor", "plan", False, False), ("rooms", "undecided", False, True)]  # fmt: skip
-    records = [
-        QuestionRecord(i, i, floor, 2 + i % 2, 2, "bar", verdict, 1.0 + i, verified=verified,
-                       peer_found=found, corners=12 + i, width_ratio=[0.9, 1.1, 1.1, np.nan][i])
-        for i, (floor, verdict, verified, found) in enumerate(rows)
-    ]  # fmt: skip
-    return table_of(records, QuestionRecord)
-
-
-def test_refused_answers_and_contradicted_proofs_are_wrong():
-    report = make_report("questions", questions=questions())
-    corridor, rooms, *_, every = report.questions
-    assert (corridor.group, corridor.plans, corridor.infeasible, corridor.wrong) == ("corridor", 2, 1, 2)
-    assert (rooms.undecided, rooms.peer_found, rooms.wrong) == (1, 1, 0)
-    assert (every.count, every.seconds.largest) == (4, 4.0)
-    assert headline(report) == "4 questions: 2 wrong answers, 1 undecided."
-
-
-def test_plans_with_contact_and_errors_of_the_planner_are_wrong():
-    record = QuestionRecord(0, 0, "room", 2, 2, "bar", "plan", 1.0, verified=True, sampled_margin=1e-6)
-    touching, failed = replace(record, sampled_margin=0.0), replace(record, verdict="failed", verified=False)
-    report = make_report("questions", questions=table_of([record, touching, failed], QuestionRecord))
-    assert (report.questions[-1].contact, report.questions[-1].refused, report.questions[-1].wrong) == (
-        1,
-        1,
-        2,
-    )
-
-
-def test_questions_are_grouped_by_what_makes_them_hard():
-    report = make_report("questions", questions=questions())
-    groups = {(one.axis, one.group): one.count for one in report.questions}
-    assert groups == {
-        ("floor", "corridor"): 3, ("floor", "rooms"): 1, ("robots", "2"): 2, ("robots", "3"): 2,
-        ("joints", "1 to 2"): 4, ("corners", "0 to 12"): 1, ("corners", "13 to 24"): 3,
-        ("width", "0.8 to 1"): 1, ("width", "1 to 1.2"): 2, ("all", "all"): 4,
-    }  # fmt: skip
-    page = render_page(report, replay)
-    assert "width 1 to 1.2" in page
-
-
-def test_searches_of_a_scenario_are_told_together():
-    def find(seed, worst, arrived=True, margin="funnel_margin"):
-        return Finding("base", "compiled", seed, 10, margin, 9e-3, worst, arrived, "", f"found/{seed}")
-
-    shares = [find(4, 0.5, margin="budget_share"), find(5, 0.9, margin="budget_share")]
-    margins, share = summarise_searches([find(1, 5e-3), find(2, 3e-3), find(3, 7e-3), *shares])
-    assert (margins.searches, margins.runs, margins.lost, margins.typical) == (3, 30, 0, 5e-3)
-    assert margins.worst.file == "found/2"
-    assert share.worst.file == "found/5"
-    (lost,) = summarise_searches([find(1, 5e-3), find(2, 6e-3, arrived=False)])
-    assert (lost.lost, lost.worst.seed) == (1, 2)
-
-
 class Links(HTMLParser):
     def __init__(self):
         super().__init__()
@@ -197,38 +120,19 @@ class Links(HTMLParser):
 
 
 def test_the_page_stands_alone_and_has_every_section(both_tiers, tmp_path):
-    found = [Finding("base", "drake", 1, 40, "funnel_margin", 5e-3, 3e-3, True, "", "<found>.yaml")]
-    breaking = [BreakingPoint("base", "drake", "mass_error", 0.2, 3.0, inf, 5, "")]
-    report = make_report(
-        "a < b", run_table(60), questions(), facts=[("seed", "1")], findings=found, breaking=breaking
-    )
+    report = make_report("a < b", run_table(60), facts=[("seed", "1")])
     page, numbers = write_report(report, tmp_path / "new", replay)
     parser, text = Links(), page.read_text()
     parser.feed(text)
     assert all(link.startswith("#") for link in parser.needed)
     assert "script" not in parser.opened
-    assert parser.opened.count("svg") == 5
-    assert parser.opened.count("h2") == 8
+    assert parser.opened.count("svg") == 2
+    assert parser.opened.count("h2") == 4
     assert "a &lt; b" in text
-    assert "&lt;found&gt;.yaml" in text
     assert "replay " in text
     read = json.loads(numbers.read_text())
     assert read["rate"]["lost"] == 0
-    assert read["breaking"][0]["lost"] is None
     assert len(read["worst"]) == 10
-
-
-def test_a_report_of_searches_alone_begins_with_what_they_found():
-    breaking = [
-        BreakingPoint("base", "drake", name, 1.0, kept, 9.0, 5, "left")
-        for name, kept in (("lag", 4.0), ("all", 2.0))
-    ]
-    report = make_report("searches", breaking=breaking)
-    assert headline(report) == "No run was lost up to 2 times what is certified (all, base)."
-    assert "svg" in render_page(report, replay)
-    finds = [Finding("base", "drake", k, 40, "funnel_margin", 5e-3, -1e-3, k > 0, "left") for k in range(3)]
-    assert headline(make_report("lost", findings=finds)).startswith("1 of 3 searches, with 120 runs,")
-    assert headline(make_report("none", findings=finds[1:])).startswith("None of 2 searches")
 
 
 def test_the_same_results_give_the_same_bytes(tmp_path):
@@ -244,3 +148,59 @@ def test_a_campaign_without_results_says_so():
     assert report.rate is None
     assert "There are no results yet." in render_page(report, replay)
     assert not any(isnan(run.share) for run in report.worst)
+
+
+def test_a_report_says_that_results_are_missing():
+    report = make_report("begun", run_table(20), missing=3)
+    assert headline(report).endswith("The campaign is not complete: 3 batches are missing.")
+    assert verdict(report) == "some"
+    assert verdict(make_report("lost", run_table(20, lost=(1,)), missing=3)) == "bad"
+    nothing = make_report("nothing", missing=1)
+    assert (headline(nothing), verdict(nothing)) == (
+        "The campaign is not complete: 1 batch is missing.", "some",
+    )  # fmt: skip
+
+
+def test_a_run_that_both_tiers_made_is_one_trial():
+    table = run_table(60, tiers=("drake", "compiled"), lost=(7,))
+    report = make_report("both", table)
+    assert (report.rate.lost, report.rate.runs) == (1, 60)
+    assert sum(group.rate.runs for group in report.groups) == 120
+    paired = pa.concat_tables([run_table(60, tiers=("compiled",)), run_table(10, lost=(3, 4))])
+    assert make_report("paired", paired).rate == loss_rate(2, 60)
+
+
+def test_a_run_that_used_more_than_the_budget_in_both_tiers_counts_once():
+    table = run_table(20, tiers=("drake", "compiled"))
+    shares = pa.array(np.where(table["run"].to_numpy() == 5, 1.2, 0.4))
+    table = table.set_column(table.schema.get_field_index("budget_share"), "budget_share", shares)
+    assert make_report("both", table).exceeded == 1
+
+
+def test_runs_of_the_same_index_in_two_scenarios_are_two_trials():
+    table = pa.concat_tables([run_table(10, scenarios=(name,)) for name in ("base", "tight")])
+    assert make_report("two", table).rate.runs == 20
+
+
+def table_of_margins(values, margins):
+    """Runs of one scenario with these values of one key and these funnel margins."""
+    records = [
+        RunRecord(k, "base", "drake", k, json.dumps({"mass_error": value}), True, funnel_margin=margin)
+        for k, (value, margin) in enumerate(zip(values, margins, strict=True))
+    ]
+    return table_of(records, RunRecord)
+
+
+@pytest.mark.parametrize("steps", [0, 1, 3, 31, 119])
+def test_values_that_differ_by_rounding_fill_one_bin(steps):
+    value = 0.0123
+    values = np.array([value, value + steps * np.spacing(value), value])
+    found = distribution(values)
+    assert max(found.heights) == sum(found.heights) == 3
+    assert "svg" in distributions_svg(make_report("equal", table_of_margins(values, values)).groups)
+    assert max(distribution(np.array([value, 1.001 * value])).heights) == 1
+
+
+def test_names_with_dollars_are_no_formulas():
+    name = r"cost $\frac$"
+    assert name in distributions_svg(make_report(name, run_table(10, scenarios=(name,))).groups)

@@ -9,7 +9,7 @@ from coop_drake.campaign.records import RunRecord
 from coop_drake.campaign.running.making import RunMaker
 from coop_drake.campaign.settings import load_campaign
 from coop_drake.campaign.variation import Variation
-from coop_drake.cli.campaign_replay import _compare, _show_both
+from coop_drake.cli.campaign import _compare, _show_both
 from coop_drake.cli.reporter import Reporter
 from coop_drake.compiled_loop import preparing
 from coop_drake.errors import ProcessError

@@ -10,14 +10,10 @@ from typing import Any
 
 import numpy as np
 
-from coop_drake.campaign.report.agreement import Agreement, agreement
 from coop_drake.campaign.report.columns import SHARE, Runs
 from coop_drake.campaign.report.distributions import Group, summarise
-from coop_drake.campaign.report.influences import Influence, influences
-from coop_drake.campaign.report.questions import Questions, summarise_questions
 from coop_drake.campaign.report.rates import CONFIDENCE, Rate, loss_rate
 from coop_drake.campaign.report.worst import WorstRun, worst_runs
-from coop_drake.campaign.search.findings import BreakingPoint, Finding
 
 
 @dataclass(frozen=True)
@@ -33,12 +29,7 @@ class Report:
         exceeded: Runs that used more than all of what the budget states, lost or not.
         most_used: Largest share of what the budget states that a run used; NaN where none is known [-].
         groups: The runs of every scenario and tier.
-        influences: How margins depend on keys that vary.
-        agreements: How far two tiers agree.
         worst: The worst runs.
-        questions: How the planner answered; empty without questions.
-        findings: What searches for lost runs found.
-        breaking: Multiples of what is certified at which runs are lost.
         missing: Batches of the campaign that are not made yet. Slow ones come last: what is there is not a
             random sample of what was asked for.
     """
@@ -49,12 +40,7 @@ class Report:
     exceeded: int
     most_used: float
     groups: tuple[Group, ...]
-    influences: tuple[Influence, ...]
-    agreements: tuple[Agreement, ...]
     worst: tuple[WorstRun, ...]
-    questions: tuple[Questions, ...]
-    findings: tuple[Finding, ...]
-    breaking: tuple[BreakingPoint, ...]
     missing: int
 
     def to_json(self) -> str:
@@ -65,28 +51,21 @@ class Report:
 def make_report(
     title: str,
     runs: Any = None,
-    questions: Any = None,
     *,
     facts: Sequence[tuple[str, str]] = (),
-    findings: Sequence[Finding] = (),
-    breaking: Sequence[BreakingPoint] = (),
     missing: int = 0,
     confidence: float = CONFIDENCE,
 ) -> Report:
-    """Compute a report from the tables of a campaign.
+    """Compute a report from the table of a campaign's runs.
 
     Args:
         title: Name of the campaign.
         runs: A pyarrow table with the columns of ``RunRecord``, None for no runs.
-        questions: A pyarrow table with the columns of ``QuestionRecord``, None for no questions.
         facts: What was asked for: name and value.
-        findings: What searches for lost runs found.
-        breaking: Multiples of what is certified at which runs are lost.
         missing: Batches of the campaign that are not made yet.
         confidence: Probability with which a true rate is not above its bound, at least [-].
     """
     known = None if runs is None or runs.num_rows == 0 else Runs(runs)
-    asked = questions is not None and questions.num_rows > 0
     used = np.empty(0) if known is None else known.floats(SHARE)
     return Report(
         title,
@@ -97,12 +76,7 @@ def make_report(
         0 if known is None else known.count_trials(used > 1.0),
         float(np.nanmax(used)) if np.isfinite(used).any() else math.nan,
         () if known is None else summarise(known, confidence),
-        () if known is None else influences(known),
-        () if known is None else agreement(known),
         () if known is None else worst_runs(known),
-        summarise_questions(questions) if asked else (),
-        tuple(findings),
-        tuple(breaking),
         missing,
     )
 

@@ -4,22 +4,19 @@ from __future__ import annotations
 
 import fcntl
 import os
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import cast
 
-from coop_drake.campaign.batches import PLANNER, Batch, Batching, question_batches
+from coop_drake.campaign.batches import Batch, Batching
 from coop_drake.campaign.plans import Plans
-from coop_drake.campaign.questions.settings import QuestionSettings
-from coop_drake.campaign.records import RunRecord
 from coop_drake.campaign.results import CampaignFolder
 from coop_drake.campaign.running.making import RunMaker
 from coop_drake.campaign.running.placing import check_scheduler, place
 from coop_drake.campaign.running.supervising import Order
-from coop_drake.campaign.search.searching import Searching, search_batches, section_of
-from coop_drake.campaign.settings import Campaign
+from coop_drake.campaign.settings import Campaign, Tier
 from coop_drake.campaign.variation import Variation
 from coop_drake.errors import ScenarioError
 from coop_drake.files import write_atomically
@@ -47,13 +44,9 @@ def batches_of(campaign: Campaign, folder: CampaignFolder) -> tuple[Batch, ...]:
     Raises:
         ScenarioError: The campaign file or a scenario is wrong.
     """
-    asked = () if campaign.questions is None else tuple(question_batches(campaign.questions))
-    others = *asked, *search_batches(campaign, folder)
-    if campaign.runs is None:
-        return others
     variation = Variation(campaign)
     variation.check()
-    return *Batching(variation, Plans(variation, folder.plans)).batches(), *others
+    return tuple(Batching(variation, Plans(variation, folder.plans)).batches())
 
 
 def run_campaign(
@@ -64,7 +57,7 @@ def run_campaign(
     scheduler: str | None = None,
     progress: Progress | None = None,
 ) -> Outcome:
-    """Make all runs and searches and answer all questions of a campaign whose results are not there yet.
+    """Make all runs of a campaign whose results are not there yet.
 
     Args:
         campaign: The campaign.
@@ -79,15 +72,58 @@ def run_campaign(
         ProcessError: Workers were lost for good; the same call goes on from there.
         OSError: Results cannot be written.
     """
+    folder = CampaignFolder(out.absolute())
+
+    def prepare(missing: Sequence[Batch]) -> None:
+        """Make the plans, which processes find in the folder, and check the runs."""
+        variation = Variation(campaign)
+        plans = Plans(variation, folder.plans)
+        for tier, scenario in dict.fromkeys((batch.tier, batch.scenario) for batch in missing):
+            plans.with_maps(variation.run(scenario * variation.runs_of_scenario), progress)
+            RunMaker(variation, plans, cast(Tier, tier), folder.path / "logs").check(scenario)
+
+    return make_batches(
+        campaign.path,
+        folder,
+        batches_of(campaign, folder),
+        prepare,
+        lambda batch: campaign.runs.time_limit,
+        workers=workers,
+        scheduler=scheduler,
+        progress=progress,
+    )
+
+
+def make_batches(
+    file: Path,
+    folder: CampaignFolder,
+    batches: tuple[Batch, ...],
+    prepare: Callable[[Sequence[Batch]], None],
+    time_limit: Callable[[Batch], float],
+    *,
+    workers: int | None,
+    scheduler: str | None,
+    progress: Progress | None,
+) -> Outcome:
+    """Make the batches whose results are not there yet, in processes of their own.
+
+    Args:
+        file: What says what they are; processes read the copy of it in the folder.
+        folder: Where results go.
+        batches: All of them.
+        prepare: Called with those that are not there, before any is made; what it raises ends the call.
+        time_limit: Longest that a process may take for a piece of a batch, or between signs of life [s].
+        workers: As in ``run_campaign``, and so are the others and the errors.
+        scheduler: As there.
+        progress: As there.
+    """
     advance = progress or (lambda doing, fraction: None)
     if scheduler is not None:
         check_scheduler(scheduler)
-    folder = CampaignFolder(out.absolute())
-    batches = batches_of(campaign, folder)
     with _locked(folder):
-        write_atomically(folder.campaign, campaign.path.read_bytes())
+        write_atomically(folder.campaign, file.read_bytes())
         missing = folder.missing(batches)
-        _plan(campaign, folder, missing, progress)
+        prepare(missing)
         there = len(batches) - len(missing)
         done: set[str] = set()
 
@@ -96,44 +132,11 @@ def run_campaign(
             count = there + len(done)
             advance(f"{count} of {len(batches)} batches", count / len(batches))
 
-        file = str(campaign.path.absolute())
-        orders = [Order(file, str(folder.path), one, _time_limit(campaign, one)) for one in missing]
+        name = str(file.absolute())
+        orders = [Order(name, str(folder.path), one, time_limit(one)) for one in missing]
         if orders:
             place(orders, workers, scheduler, note)
         return Outcome(folder, batches, len(done))
-
-
-def _plan(
-    campaign: Campaign, folder: CampaignFolder, missing: Iterable[Batch], progress: Progress | None
-) -> None:
-    """Make the plans of batches that are not there, which processes find in the folder, and check the runs.
-
-    Raises:
-        ScenarioError: A loop does not know what it shall simulate.
-        PlanError: There is no plan for a scenario.
-    """
-    asked = {(batch.tier, batch.scenario): batch.record for batch in missing if batch.tier != PLANNER}
-    variation = Variation(campaign) if RunRecord in asked.values() else None
-    for kind, scenario in asked:
-        if kind == "search" or kind == "breaking":
-            Searching(campaign, folder, kind, scenario).trials.check()
-        elif variation is not None:
-            plans = Plans(variation, folder.plans)
-            plans.with_maps(variation.run(scenario * variation.runs_of_scenario), progress)
-            RunMaker(variation, plans, kind, folder.path / "logs").check(scenario)
-
-
-def _time_limit(campaign: Campaign, batch: Batch) -> float:
-    """Longest that a process may take for a run or a question of a batch, or for a run of a search [s]."""
-    if batch.tier == PLANNER:
-        limits: Any = campaign.questions
-    elif batch.tier == "search" or batch.tier == "breaking":
-        limits = section_of(campaign, batch.tier)
-    else:
-        limits = campaign.runs
-    assert limits is not None  # or there would be no such batch
-    longest: float = limits.longest if isinstance(limits, QuestionSettings) else limits.time_limit
-    return longest
 
 
 @contextmanager

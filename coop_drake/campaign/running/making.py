@@ -2,21 +2,25 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from coop_drake.answers.digest import content_digest
 from coop_drake.answers.log import SimulationLog
 from coop_drake.answers.plan import Plan
 from coop_drake.answers.plan_file import plan_digest
+from coop_drake.campaign.batches import Batch, Batching, Task, Work
 from coop_drake.campaign.measuring import record_of_log
 from coop_drake.campaign.plans import Maps, Plans, versions
 from coop_drake.campaign.records import RunRecord
-from coop_drake.campaign.settings import Tier
+from coop_drake.campaign.results import CampaignFolder
+from coop_drake.campaign.settings import Tier, load_campaign
 from coop_drake.campaign.variation import Run, Variation
-from coop_drake.errors import ScenarioError
+from coop_drake.errors import CoopDrakeError, ScenarioError
 from coop_drake.plant.scenario_digest import models_digest, scenario_digest
 from coop_drake.scenario.model import Scenario
 from coop_drake.typed_data import DataError
@@ -162,3 +166,30 @@ def run_digest(scenario: Scenario, plan: str, tier: Tier, models: str | None = N
     """
     parts = {"scenario": scenario_digest(scenario, models), "plan": plan, "tier": tier}
     return content_digest({**parts, "versions": versions()})
+
+
+def _tasks(order: dict[str, Any], alive: Callable[[], None]) -> Iterator[Task]:
+    """Yield the runs of a batch that are to be made."""
+    folder, batch = CampaignFolder(Path(order["folder"])), order["batch"]
+    variation = Variation(load_campaign(folder.campaign, Path(order["campaign"])))
+    plans = Plans(variation, folder.plans)
+    place = batch["scenario"], batch["tier"], batch["first"], batch["stop"]
+    check_unchanged(order, Batching(variation, plans).batch(*place))
+    maker = RunMaker(variation, plans, batch["tier"], folder.path / "logs")
+    for index in range(order["begin"], batch["stop"]):
+        run = variation.run(index)
+        yield maker.begun(run), partial(maker.record, run)
+
+
+RUNS = Work("runs", RunRecord, _tasks)
+"""Runs of transports."""
+
+
+def check_unchanged(order: dict[str, Any], batch: Batch) -> None:
+    """Check that what files say now gives the batch that was ordered.
+
+    Raises:
+        CoopDrakeError: It does not.
+    """
+    if batch.digest != order["batch"]["digest"]:
+        raise CoopDrakeError(f"{order['campaign']}: a scenario or a model was changed while the campaign ran")

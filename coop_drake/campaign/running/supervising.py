@@ -37,10 +37,10 @@ class Order:
     """A batch that is to be made.
 
     Attributes:
-        campaign: The campaign file, against which the names of scenarios are resolved.
+        campaign: The file, against which the names of scenarios are resolved.
         folder: The folder of the results, which every worker must see under this name.
         batch: The batch.
-        time_limit: Longest that a run or a question may take, or a run of a search [s].
+        time_limit: Longest that a run may take, or other work without a sign of life [s].
     """
 
     campaign: str
@@ -114,6 +114,7 @@ def _lines(order: Order, begin: int) -> Iterator[tuple[str, Any]]:
             stdin=pipe,
             stdout=pipe,
             stderr=errors,
+            env={**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))},  # It finds the same.
         ) as process,
     ):
         assert process.stdout is not None  # it is a pipe

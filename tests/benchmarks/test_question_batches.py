@@ -1,4 +1,4 @@
-"""Questions of a campaign: in batches that do not depend on each other, answered by a process of its own."""
+"""Questions of a study: in batches that do not depend on each other, answered by a process of its own."""
 
 import json
 from dataclasses import asdict, replace
@@ -6,15 +6,15 @@ from dataclasses import asdict, replace
 import pytest
 from typer.testing import CliRunner
 
-from coop_drake.campaign import Campaign, QuestionRecord, load_campaign
-from coop_drake.campaign.batches import PLANNER, question_batches
+from benchmarks.app import app
+from benchmarks.questions.answering import ask
+from benchmarks.questions.record import MEASURED, QuestionRecord
+from benchmarks.questions.settings import QuestionSettings
+from benchmarks.questions.work import CASES, question_batches
+from benchmarks.study import Study, batches_of, load_study
 from coop_drake.campaign.plans import source_digest
-from coop_drake.campaign.questions import QuestionSettings, ask
-from coop_drake.campaign.records import MEASURED
 from coop_drake.campaign.results import CampaignFolder
-from coop_drake.campaign.running.command import batches_of
-from coop_drake.campaign.running.supervising import Order, make_batch
-from coop_drake.cli.app import app
+from coop_drake.campaign.running import Order, make_batch
 from coop_drake.errors import ScenarioError
 
 FILE = """
@@ -25,10 +25,10 @@ LAST = 4
 
 
 @pytest.fixture(scope="module")
-def campaign(tmp_path_factory) -> Campaign:
-    path = tmp_path_factory.mktemp("campaign") / "asked.campaign.yaml"
+def asked(tmp_path_factory) -> Study:
+    path = tmp_path_factory.mktemp("study") / "asked.study.yaml"
     path.write_text(FILE)
-    return load_campaign(path)
+    return load_study(path)
 
 
 def test_more_questions_and_other_floors_change_only_the_batches_that_they_concern():
@@ -42,60 +42,54 @@ def test_more_questions_and_other_floors_change_only_the_batches_that_they_conce
 
 
 @pytest.mark.slow
-def test_a_process_answers_as_this_one_does(campaign, tmp_path):
+def test_a_process_answers_as_this_one_does(asked, tmp_path):
     folder = CampaignFolder(tmp_path)
     folder.campaign.write_text(FILE)
-    batches = batches_of(campaign, folder)
-    assert {one.tier for one in batches} == {PLANNER}
+    batches = batches_of(asked, folder)
+    assert {one.tier for one in batches} == {"planner"}
     last = batches[LAST // 2]
-    assert make_batch(Order(str(campaign.path), str(tmp_path), last, 600.0))
+    assert make_batch(Order(str(asked.path), str(tmp_path), last, 600.0))
     assert folder.missing(batches) == list(batches[:-1])
     assert folder.costs(batches)[0]["sources"] == source_digest()
     assert folder.by_other_sources(batches) == 0
-    (row,) = folder.questions(batches).to_pylist()
-    here = asdict(ask(LAST, campaign.questions))
+    (row,) = folder.records(batches, QuestionRecord).to_pylist()
+    here = asdict(ask(LAST, asked.questions))
     differing = {name for name in row if str(row[name]) != str(here[name])}
     assert all(name.endswith(MEASURED) for name in differing)
     assert row["verdict"] == "plan"
     assert row["verified"]
-    assert folder.table(batches).num_rows == 0
-    assert not folder.cases.exists()
+    assert not (folder.path / CASES).exists()
 
 
-def test_a_wrong_answer_is_counted_and_fails_the_command(campaign, tmp_path):
-    folder, command = CampaignFolder(tmp_path), [str(campaign.path), "--out", str(tmp_path), "--json"]
+def test_a_wrong_answer_is_counted_and_fails_the_command(asked, tmp_path):
+    folder, command = CampaignFolder(tmp_path), [str(asked.path), "--out", str(tmp_path), "--json"]
     right = QuestionRecord(0, 3, "room", 2, 2, "bar", "plan", 1.0, verified=True, sampled_margin=1e-6)
-    for batch in batches_of(campaign, folder):
+    for batch in batches_of(asked, folder):
         folder.write(batch, [replace(right, question=number) for number in range(batch.first, batch.stop)])
-    assert CliRunner().invoke(app, ["campaign", "run", *command]).exit_code == 0
+    assert CliRunner().invoke(app, ["study", *command]).exit_code == 0
     folder.write(batch, [replace(right, question=LAST, verified=False)])
-    failed = CliRunner().invoke(app, ["campaign", "run", *command])
+    failed = CliRunner().invoke(app, ["study", *command])
     assert failed.exit_code == 1
     every = json.loads(failed.stdout)["questions"][-1]
     assert (every["count"], every["plans"], every["wrong"]) == (5, 5, 1)
 
 
-def test_batches_that_other_sources_made_are_counted(campaign, tmp_path):
-    folder, options = CampaignFolder(tmp_path), [str(campaign.path), "--out", str(tmp_path), "--json"]
+def test_batches_that_other_sources_made_are_counted(asked, tmp_path):
+    folder, options = CampaignFolder(tmp_path), [str(asked.path), "--out", str(tmp_path), "--json"]
     made = QuestionRecord(0, 3, "room", 2, 2, "bar", "plan", 1.0, verified=True, sampled_margin=1e-6)
-    first, second, *_ = batches_of(campaign, folder)
+    first, second, *_ = batches_of(asked, folder)
     for batch, sources in ((first, source_digest()), (second, "0" * 64)):
         folder.write(batch, [replace(made, question=number) for number in range(batch.first, batch.stop)])
         folder.note(batch, {"runs": 1, "cpu_seconds": 1.0, "sources": sources})
-    status = CliRunner().invoke(app, ["campaign", "status", *options])
+    status = CliRunner().invoke(app, ["study", "--status", *options])
     assert json.loads(status.stdout)["batches_by_other_sources"] == 1
-    shown = CliRunner().invoke(app, ["campaign", "status", *options[:-1]], terminal_width=80).stdout
+    shown = CliRunner().invoke(app, ["study", "--status", *options[:-1]], terminal_width=80).stdout
     assert "corners 0 to 12" in shown
     assert "…" not in shown  # All columns fit.
-    assert CliRunner().invoke(app, ["campaign", "report", *options]).exit_code == 0
-    facts = json.loads((tmp_path / "report.json").read_text())["facts"]
-    assert ["batches by other sources of coop_drake", "1"] in facts
 
 
-def test_a_question_is_written_as_a_scenario(campaign, tmp_path):
-    done = CliRunner().invoke(
-        app, ["campaign", "question", str(campaign.path), str(LAST), "--out", str(tmp_path), "--quiet"]
-    )
+def test_a_question_is_written_as_a_scenario(asked, tmp_path):
+    done = CliRunner().invoke(app, ["question", str(asked.path), str(LAST), "--out", str(tmp_path)])
     assert done.exit_code == 0
     assert (tmp_path / "drawn" / "4" / "question_3_4.scenario.yaml").exists()
 
@@ -109,7 +103,7 @@ def test_a_question_is_written_as_a_scenario(campaign, tmp_path):
     ],
 )
 def test_what_cannot_be_asked_is_refused(tmp_path, text, key):
-    path = tmp_path / "wrong.campaign.yaml"
+    path = tmp_path / "wrong.study.yaml"
     path.write_text(text)
     with pytest.raises(ScenarioError, match=key):
-        load_campaign(path)
+        load_study(path)

@@ -1,51 +1,58 @@
-"""The searches and the bisections of a campaign file: their batches, and how each of them is made."""
+"""The searches and the bisections of a study: their batches, and how each of them is made."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import asdict, replace
-from functools import cached_property
+from functools import cached_property, partial
 from math import inf, nan
-from typing import Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
+from benchmarks.searches.bounds import BoundedDepartures
+from benchmarks.searches.breaking import first_lost
+from benchmarks.searches.findings import BreakingPoint, Finding
+from benchmarks.searches.multiples import SCALED, departures_at, largest_multiple
+from benchmarks.searches.settings import Breaking, Searches
+from benchmarks.searches.trials import Trials
+from benchmarks.searches.worst import search_worst
 from coop_drake.answers.digest import content_digest
-from coop_drake.campaign.batches import BREAKING, SEARCH, Batch, SearchKind
+from coop_drake.campaign.batches import Batch, Task, Work
 from coop_drake.campaign.plans import versions
 from coop_drake.campaign.results import CampaignFolder
-from coop_drake.campaign.search.bounds import BoundedDepartures
-from coop_drake.campaign.search.breaking import first_lost
-from coop_drake.campaign.search.findings import BreakingPoint, Finding
-from coop_drake.campaign.search.multiples import SCALED, departures_at, largest_multiple
-from coop_drake.campaign.search.settings import Breaking, Searches
-from coop_drake.campaign.search.trials import Trials
-from coop_drake.campaign.search.worst import search_worst
-from coop_drake.campaign.settings import Campaign
+from coop_drake.campaign.running.making import check_unchanged
+
+if TYPE_CHECKING:
+    from benchmarks.study import Study
+
+SearchKind = Literal["search", "breaking"]
+"""Searches, or bisections of departures; batches have it in place of a tier."""
 
 _NO_MATTER = ("scenarios", "count", "departures", "batch", "time_limit")
 """Keys on which the result of a single search or bisection does not depend."""
 
 
-def section_of(campaign: Campaign, kind: SearchKind) -> Searches | Breaking | None:
+def section_of(study: Study, kind: SearchKind) -> Searches | Breaking | None:
     """Return the section that asks for searches or for bisections, None where there is none."""
-    return campaign.searches if kind == SEARCH else campaign.breaking
+    return study.searches if kind == "search" else study.breaking
 
 
-def search_batches(campaign: Campaign, folder: CampaignFolder) -> Iterator[Batch]:
-    """Yield the batches of all searches and bisections of a campaign, scenario by scenario."""
-    kinds: tuple[SearchKind, ...] = (SEARCH, BREAKING)
+def search_batches(study: Study, folder: CampaignFolder) -> Iterator[Batch]:
+    """Yield the batches of all searches and bisections of a study, scenario by scenario."""
+    kinds: tuple[SearchKind, ...] = ("search", "breaking")
     for kind in kinds:
-        if (asked := section_of(campaign, kind)) is not None:
+        if (asked := section_of(study, kind)) is not None:
             for scenario in range(len(asked.scenarios)):
-                yield from Searching(campaign, folder, kind, scenario).batches()
+                yield from Searching(study, folder, kind, scenario).batches()
 
 
 class Searching:
     """The searches of one scenario, or the bisections of one departure after the other.
 
     Args:
-        campaign: The campaign.
+        study: The study.
         folder: The folder of its results.
         kind: Whether these are searches or bisections.
         scenario: Index of the scenario in their section.
@@ -54,16 +61,16 @@ class Searching:
 
     def __init__(
         self,
-        campaign: Campaign,
+        study: Study,
         folder: CampaignFolder,
         kind: SearchKind,
         scenario: int,
         made: Callable[[], None] = lambda: None,
     ) -> None:
-        asked = section_of(campaign, kind)
+        asked = section_of(study, kind)
         assert asked is not None  # or there would be no batch of this kind
         self._asked, self._kind, self._scenario, self._folder = asked, kind, scenario, folder
-        self.trials = Trials(campaign, asked, asked.scenarios[scenario], folder, made)
+        self.trials = Trials(study.path, asked, asked.scenarios[scenario], folder, made)
 
     def batches(self) -> Iterator[Batch]:
         """Yield the batches of all of them."""
@@ -77,7 +84,8 @@ class Searching:
         if isinstance(self._asked, Breaking):
             which = self._asked.departures[first:stop]
         content = {**self._content, "kind": self._kind, "which": which}
-        return Batch(self._scenario, self._kind, first, stop, content_digest(content))
+        work = "SEARCHES" if self._kind == "search" else "BISECTIONS"
+        return Batch(self._scenario, self._kind, first, stop, content_digest(content), f"{__name__}:{work}")
 
     @cached_property
     def _content(self) -> dict[str, Any]:
@@ -144,3 +152,22 @@ class Searching:
         point = self.begun(index)
         assert isinstance(point, BreakingPoint)
         return replace(point, certified=certified, kept=kept, lost=upper, reason=reason)
+
+
+def _tasks(order: dict[str, Any], alive: Callable[[], None]) -> Iterator[Task]:
+    """Yield the searches or bisections of a batch that are to be made."""
+    from benchmarks.study import load_study
+
+    folder, batch = CampaignFolder(Path(order["folder"])), order["batch"]
+    study = load_study(folder.campaign, Path(order["campaign"]))
+    searching = Searching(study, folder, batch["tier"], batch["scenario"], alive)
+    check_unchanged(order, searching.batch(batch["first"], batch["stop"]))
+    for index in range(order["begin"], batch["stop"]):
+        yield searching.begun(index), partial(searching.record, index)
+
+
+SEARCHES = Work("searches", Finding, _tasks)
+"""Searches for runs with small margins."""
+
+BISECTIONS = Work("breaking", BreakingPoint, _tasks)
+"""Bisections of departures."""

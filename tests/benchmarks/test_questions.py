@@ -9,20 +9,20 @@ import pytest
 import shapely
 from shapely import box
 
+from benchmarks.questions import answering
+from benchmarks.questions.answering import answer, ask
+from benchmarks.questions.floors import FLOORS, random_floor
+from benchmarks.questions.narrowest import narrowest_corridor
+from benchmarks.questions.path_check import fault_of
+from benchmarks.questions.peers import Searched, search_by_peers
+from benchmarks.questions.question import random_question
+from benchmarks.questions.record import QuestionRecord
+from benchmarks.questions.sampled_cells import sampled_margin
+from benchmarks.questions.settings import QuestionSettings
+from benchmarks.questions.teams import SHAPES, random_count, random_team
 from coop_drake.answers import Found, Infeasible, Undecided
 from coop_drake.answers.problem import at_goal
 from coop_drake.answers.search_report import SearchReport
-from coop_drake.campaign.questions import answering
-from coop_drake.campaign.questions.answering import answer, ask
-from coop_drake.campaign.questions.floors import FLOORS, random_floor
-from coop_drake.campaign.questions.narrowest import narrowest_corridor
-from coop_drake.campaign.questions.path_check import fault_of
-from coop_drake.campaign.questions.peers import Searched, search_by_peers
-from coop_drake.campaign.questions.question import random_question
-from coop_drake.campaign.questions.sampled_cells import sampled_margin
-from coop_drake.campaign.questions.settings import QuestionSettings
-from coop_drake.campaign.questions.teams import SHAPES, random_count, random_team
-from coop_drake.campaign.records import QuestionRecord
 from coop_drake.planning.planner import plan
 from coop_drake.plant import planning_problem
 from coop_drake.plant.placement import collisions

@@ -20,9 +20,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from benchmarks.questions.footprint import free_goals, prepared_check
+from benchmarks.questions.peer import GOALS, MOTION_STEP, RANGE, PeerRun
 from coop_drake.answers import PlanningProblem
-from coop_drake.campaign.questions.footprint import free_goals, prepared_check
-from coop_drake.campaign.questions.peer import GOALS, MOTION_STEP, RANGE, PeerRun
 from coop_drake.tree.levers import configuration_scale
 from coop_drake.tree.pose import FloatArray
 

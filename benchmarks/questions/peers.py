@@ -6,11 +6,11 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from math import nan
 
+from benchmarks.questions.ompl_peer import has_ompl, run_ompl
+from benchmarks.questions.path_check import fault_of
+from benchmarks.questions.peer import PeerRun
+from benchmarks.questions.trees_peer import run_trees
 from coop_drake.answers import PlanningProblem
-from coop_drake.campaign.questions.ompl_peer import has_ompl, run_ompl
-from coop_drake.campaign.questions.path_check import fault_of
-from coop_drake.campaign.questions.peer import PeerRun
-from coop_drake.campaign.questions.trees_peer import run_trees
 from coop_drake.tree.pose import FloatArray
 
 _CHECKS = 50_000

@@ -11,10 +11,10 @@ from time import process_time
 
 import numpy as np
 
+from benchmarks.questions.footprint import free_goals, prepared_check
+from benchmarks.questions.peer import GOALS, MOTION_STEP, RANGE, PeerRun
+from benchmarks.questions.tree_kernels import rrt_connect
 from coop_drake.answers import PlanningProblem
-from coop_drake.campaign.questions.footprint import free_goals, prepared_check
-from coop_drake.campaign.questions.peer import GOALS, MOTION_STEP, RANGE, PeerRun
-from coop_drake.campaign.questions.tree_kernels import rrt_connect
 from coop_drake.planning.sampling.collision import grid_for_team
 from coop_drake.tree.levers import configuration_scale
 

@@ -1,4 +1,4 @@
-"""What the searches of a scenario found together."""
+"""What the searches of a scenario found together, and in a sentence."""
 
 from __future__ import annotations
 
@@ -8,7 +8,8 @@ from math import isfinite, isnan, nan
 
 import numpy as np
 
-from coop_drake.campaign.search.findings import Finding
+from benchmarks.searches.findings import Finding
+from coop_drake.campaign.report.rates import percent
 
 
 @dataclass(frozen=True)
@@ -78,3 +79,24 @@ def _median(values: Sequence[float]) -> float:
     """The median of the values that are numbers; NaN if there are none."""
     known = [value for value in values if isfinite(value)]
     return float(np.median(known)) if known else nan
+
+
+def sentence(findings: Sequence[Finding]) -> str:
+    """Say how many searches found a lost run, how many could not be made, and what of the budget was used."""
+    made = [one for one in findings if is_made(one)]
+    lost, runs = sum(map(found_loss, made)), sum(one.evaluations for one in made)
+    told = []
+    if made:
+        number = f"{lost:,}" if lost else "None"
+        told.append(f"{number} of {_searches(len(made))}, with {runs:,} runs, found a run that is lost.")
+    if failed := len(findings) - len(made):
+        told.append(f"{_searches(failed)} could not be made.")
+    used = [one.worst for one in made if one.margin == "budget_share" and one.worst > 1.0]
+    if used:
+        most = percent(max(used))
+        told.append(f"{_searches(len(used))} used more than the budget states, up to {most} of it.")
+    return " ".join(told)
+
+
+def _searches(count: int) -> str:
+    return "1 search" if count == 1 else f"{count:,} searches"

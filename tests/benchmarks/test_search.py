@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 import coop_drake
+from benchmarks.searches.bounds import BoundedDepartures
+from benchmarks.searches.breaking import first_lost
+from benchmarks.searches.worst import margin_of, search_worst
 from coop_drake.campaign.records import RunRecord
-from coop_drake.campaign.search.bounds import BoundedDepartures
-from coop_drake.campaign.search.breaking import first_lost
-from coop_drake.campaign.search.worst import margin_of, search_worst
 from coop_drake.plant import planning_problem
 from coop_drake.plant.budgets import budget_of
 from coop_drake.scenario.measured_bounds import wave_bounds

@@ -10,11 +10,11 @@ import numpy as np
 import shapely
 from shapely import Polygon
 
+from benchmarks.questions.floors import Random, RandomFloor, random_floor
+from benchmarks.questions.narrowest import narrowest_corridor
+from benchmarks.questions.settings import QuestionSettings
+from benchmarks.questions.teams import RandomTeam, random_count, random_team
 from coop_drake.answers import PlanningProblem
-from coop_drake.campaign.questions.floors import Random, RandomFloor, random_floor
-from coop_drake.campaign.questions.narrowest import narrowest_corridor
-from coop_drake.campaign.questions.settings import QuestionSettings
-from coop_drake.campaign.questions.teams import RandomTeam, random_count, random_team
 from coop_drake.errors import CoopDrakeError, ScenarioError
 from coop_drake.files import write_atomically
 from coop_drake.planning.sampling.collision import grid_for_team, is_free

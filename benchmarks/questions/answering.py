@@ -12,13 +12,13 @@ from time import process_time
 
 import shapely
 
+from benchmarks.questions.peers import Searched, search_by_peers
+from benchmarks.questions.question import Question, random_question
+from benchmarks.questions.record import QuestionRecord
+from benchmarks.questions.sampled_cells import sampled_margin
+from benchmarks.questions.settings import QuestionSettings
 from coop_drake.answers import BeyondLimits, Found, Infeasible, PlanningResult, Undecided
 from coop_drake.answers.search_report import SearchReport
-from coop_drake.campaign.questions.peers import Searched, search_by_peers
-from coop_drake.campaign.questions.question import Question, random_question
-from coop_drake.campaign.questions.sampled_cells import sampled_margin
-from coop_drake.campaign.questions.settings import QuestionSettings
-from coop_drake.campaign.records import QuestionRecord
 from coop_drake.errors import PatienceError, RefusalError
 from coop_drake.files import write_atomically
 from coop_drake.planning.planner import plan

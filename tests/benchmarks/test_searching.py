@@ -1,4 +1,4 @@
-"""Searches and bisections of a campaign file, and that what they find can be made again."""
+"""Searches and bisections of a study, and that what they find can be made again."""
 
 import json
 from dataclasses import replace
@@ -7,15 +7,17 @@ from math import inf, isfinite
 import numpy as np
 import pytest
 import yaml
+from typer.testing import CliRunner
 
+from benchmarks.app import app
+from benchmarks.searches.findings import BreakingPoint, Finding
+from benchmarks.searches.multiples import departures_at, largest_multiple, multiplied
+from benchmarks.searches.searching import Searching, search_batches
+from benchmarks.study import load_study, make_study
 from coop_drake.campaign import load_campaign
 from coop_drake.campaign.plans import Plans
 from coop_drake.campaign.results import CampaignFolder
-from coop_drake.campaign.running import run_campaign
 from coop_drake.campaign.running.making import RunMaker
-from coop_drake.campaign.search import BreakingPoint
-from coop_drake.campaign.search.multiples import departures_at, largest_multiple, multiplied
-from coop_drake.campaign.search.searching import Searching, search_batches
 from coop_drake.campaign.variation import Variation
 from coop_drake.errors import ScenarioError
 from tests.support.cli import invoke
@@ -28,28 +30,33 @@ BROKEN = {**ASKED, "departures": ["angles", "model"], "runs": 2, "halvings": 6, 
 
 
 @pytest.fixture(scope="module")
-def campaign(tmp_path_factory):
+def study(tmp_path_factory):
     folder = tmp_path_factory.mktemp("searches")
     write_scenario(folder / "room.scenario.yaml")
     sections = {"searches": {**ASKED, "evaluations": 2, "seed": 4}, "breaking": BROKEN}
-    file = folder / "room.campaign.yaml"
+    file = folder / "room.study.yaml"
     file.write_text(yaml.safe_dump(sections))
-    return load_campaign(file)
+    return load_study(file)
 
 
 @pytest.fixture(scope="module")
-def searched(campaign):
+def searched(study):
     """The one search of the campaign, made in a process of its own."""
-    alone = replace(campaign, breaking=None)
-    return alone, run_campaign(alone, campaign.path.parent / "results", workers=1)
+    alone = replace(study, breaking=None)
+    return alone, make_study(alone, CampaignFolder(study.path.parent / "results"), workers=1)
+
+
+def found(outcome):
+    """The one finding of a study."""
+    (row,) = outcome.folder.records(outcome.batches, Finding).to_pylist()
+    return Finding(**row)
 
 
 def test_a_search_is_made_once_and_kept(searched):
-    campaign, outcome = searched
+    study, outcome = searched
     assert outcome.made == 1
-    assert run_campaign(campaign, outcome.folder.path, workers=1).made == 0
-    (finding,), points = outcome.folder.findings(outcome.batches)
-    assert points == []
+    assert make_study(study, outcome.folder, workers=1).made == 0
+    finding = found(outcome)
     assert (finding.scenario, finding.tier, finding.seed, finding.evaluations) == ("room", "drake", 4, 2)
     assert finding.arrived
     assert 0.0 < finding.worst <= finding.before
@@ -57,7 +64,7 @@ def test_a_search_is_made_once_and_kept(searched):
 
 def test_the_worst_run_is_found_again_to_the_last_bit(searched):
     _, outcome = searched
-    (finding,), _ = outcome.folder.findings(outcome.batches)
+    finding = found(outcome)
     folder = outcome.folder.path
     again = Variation(load_campaign(folder / finding.file))
     assert again.count == 1
@@ -68,8 +75,8 @@ def test_the_worst_run_is_found_again_to_the_last_bit(searched):
     assert len(list((folder / "plans").iterdir())) == 1  # it follows the plan of the search
 
 
-def test_what_a_search_finds_by_the_compiled_loop_is_replayed_by_both_loops(campaign, tmp_path):
-    asked = replace(campaign, searches=replace(campaign.searches, tier="compiled"), breaking=None)
+def test_what_a_search_finds_by_the_compiled_loop_is_replayed_by_both_loops(study, tmp_path):
+    asked = replace(study, searches=replace(study.searches, tier="compiled"), breaking=None)
     finding = Searching(asked, CampaignFolder(tmp_path), "search", 0).record(0)
     file = tmp_path / finding.file
     assert load_campaign(file).runs.tier == "compiled"
@@ -80,13 +87,13 @@ def test_what_a_search_finds_by_the_compiled_loop_is_replayed_by_both_loops(camp
     assert drake == pytest.approx(compiled, abs=5e-4)
 
 
-def test_a_breaking_point_is_where_the_first_run_is_lost(campaign, searched, monkeypatch):
+def test_a_breaking_point_is_where_the_first_run_is_lost(study, searched, monkeypatch):
     def record(maker, run):
         size = run.values["deployment.measurements.waves.angle.size"]
         return replace(maker.begun(run), arrived=size < 0.006, reason="" if size < 0.006 else "left")
 
     monkeypatch.setattr(RunMaker, "record", record)
-    searching = Searching(campaign, searched[1].folder, "breaking", 0)
+    searching = Searching(study, searched[1].folder, "breaking", 0)
     angles, model = map(searching.record, range(2))
     assert angles.certified == 0.0015
     assert (angles.kept < 4.0 <= angles.lost, angles.lost - angles.kept <= 0.1) == (True, True)
@@ -94,30 +101,30 @@ def test_a_breaking_point_is_where_the_first_run_is_lost(campaign, searched, mon
     assert (model.departure, model.kept, model.lost, model.beyond) == ("model", 4.0, inf, None)
     assert isinstance(model, BreakingPoint)
     delay = {"departures": ("delay",), "largest": 4096.0}  # A delay of more than 10 s is not allowed.
-    asked = replace(campaign, breaking=replace(campaign.breaking, **delay))
+    asked = replace(study, breaking=replace(study.breaking, **delay))
     (point,) = map(Searching(asked, searched[1].folder, "breaking", 0).record, range(1))
     assert (point.kept, point.lost, point.reason) == (512.0, inf, "")
     batches = list(searching.batches())
     searched[1].folder.write(batches[1], [model])
-    assert searched[1].folder.findings(batches) == ([], [model])
+    assert searched[1].folder.records(batches, BreakingPoint).to_pylist() == [vars(model)]
 
 
 @pytest.mark.parametrize(("kept", "code"), [(2.0, 0), (0.5, 1)])
-def test_a_loss_inside_what_is_certified_makes_the_command_fail(campaign, tmp_path, kept, code):
-    file = campaign.path.with_name("breaking.campaign.yaml")
+def test_a_loss_inside_what_is_certified_makes_the_command_fail(study, tmp_path, kept, code):
+    file = study.path.with_name("breaking.study.yaml")
     file.write_text(yaml.safe_dump({"breaking": {**BROKEN, "departures": ["angles"]}}))
     folder = CampaignFolder(tmp_path)
-    (batch,) = search_batches(load_campaign(file), folder)
+    (batch,) = search_batches(load_study(file), folder)
     folder.write(batch, [BreakingPoint("room", "drake", "angles", 0.0015, kept, kept + 0.1, 2, "left")])
-    result = invoke("campaign", "run", file, "--out", tmp_path)
+    result = CliRunner().invoke(app, ["study", str(file), "--out", str(tmp_path)])
     assert (result.exit_code, result.stderr) == (code, "")
     assert "angles" in result.stdout
 
 
-def test_further_searches_leave_the_results_of_earlier_ones_valid(campaign, tmp_path):
-    more = replace(campaign, searches=replace(campaign.searches, count=3), breaking=None)
+def test_further_searches_leave_the_results_of_earlier_ones_valid(study, tmp_path):
+    more = replace(study, searches=replace(study.searches, count=3), breaking=None)
     folder = CampaignFolder(tmp_path)
-    before, after = (list(search_batches(one, folder)) for one in (campaign, more))
+    before, after = (list(search_batches(one, folder)) for one in (study, more))
     assert [(one.tier, one.first) for one in before] == [("search", 0), ("breaking", 0), ("breaking", 1)]
     assert [(one.first, one.stop) for one in after] == [(0, 1), (1, 2), (2, 3)]
     assert Searching(more, folder, "search", 0).begun(2).seed == 6
@@ -128,8 +135,8 @@ def test_further_searches_leave_the_results_of_earlier_ones_valid(campaign, tmp_
     assert [(one.first, one.stop) for one in search_batches(larger, folder)] == [(0, 2), (2, 3)]
 
 
-def test_one_departure_acts_alone_at_its_multiple_and_all_errors_together(campaign, searched):
-    trials = Searching(campaign, searched[1].folder, "search", 0).trials
+def test_one_departure_acts_alone_at_its_multiple_and_all_errors_together(study, searched):
+    trials = Searching(study, searched[1].folder, "search", 0).trials
     budget, tree = trials.budget, trials.tree
     waves = "deployment.measurements.waves"
     angles = departures_at(budget, tree, "angles", 3.0, 1)
@@ -159,14 +166,14 @@ def test_one_departure_acts_alone_at_its_multiple_and_all_errors_together(campai
     ],
 )
 def test_wrong_sections_are_refused_with_file_and_key(section, key, tmp_path):
-    file = tmp_path / "wrong.campaign.yaml"
+    file = tmp_path / "wrong.study.yaml"
     file.write_text(yaml.safe_dump(section))
     with pytest.raises(ScenarioError) as refused:
-        load_campaign(file)
+        load_study(file)
     assert refused.value.key == key
 
 
-def test_a_search_needs_a_budget(campaign, searched):
-    asked = replace(campaign, searches=replace(campaign.searches, budget=None))
+def test_a_search_needs_a_budget(study, searched):
+    asked = replace(study, searches=replace(study.searches, budget=None))
     with pytest.raises(ScenarioError, match="what is certified"):
         _ = Searching(asked, searched[1].folder, "search", 0).trials.budget

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from math import isfinite, isnan
 
-from coop_drake.campaign.search.findings import BreakingPoint
+from benchmarks.searches.findings import BreakingPoint
 
 UNKNOWN = "not determined"
 """What stands in place of a multiple where a bisection found none."""

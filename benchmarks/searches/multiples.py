@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.searches.bounds import START, BoundedDepartures
 from coop_drake.answers.budget import Budget
-from coop_drake.campaign.search.bounds import START, BoundedDepartures
 from coop_drake.tree import ComponentTree
 
 _SIZES = ("angle_noise", "rate_noise", "velocity_noise", "position_noise", "model_error")
