@@ -13,7 +13,7 @@ from benchmarks.tasks import Rows, Task
 __all__ = ["CAUSES", "hard_question_tasks"]
 
 SETTINGS = QuestionSettings(seeds=(20261, 20262, 20263))
-"""The settings of ``benchmarks/campaigns/questions.campaign.yaml`` that determine its questions."""
+"""The settings of ``benchmarks/campaigns/questions.study.yaml`` that determine its questions."""
 
 CAUSES = {
     4: "a corridor of 1.06 of the narrowest one, two robots: a way is certified that is narrower than the "

@@ -1,4 +1,4 @@
-"""The report of a campaign: rates, distributions, worst runs; results that are few, equal, lost or made twice."""
+"""The report of a campaign: rates, distributions, worst runs; results that are few, equal or lost."""
 
 import json
 from html.parser import HTMLParser
