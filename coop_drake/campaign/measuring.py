@@ -12,7 +12,7 @@ from coop_drake.answers.plan import Plan
 from coop_drake.campaign.records import RunRecord
 from coop_drake.campaign.variation import Run
 from coop_drake.errors import RefusalError
-from coop_drake.tuning.criteria import CRITERIA
+from coop_drake.tuning.objective import CRITERIA
 from coop_drake.verification.runs import Rows, budget_share
 
 

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import json
 import os
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from rich.markup import escape
@@ -12,9 +14,11 @@ from coop_drake.cli.plan import plan_of
 from coop_drake.cli.reporter import ExitCode, Reporter
 from coop_drake.cli.results import ResultFolder
 from coop_drake.cli.task import Task, map_cells, read_task
+from coop_drake.files import write_atomically
+from coop_drake.laws import GainSet
+from coop_drake.scenario import dump_gains
 from coop_drake.tuning import (
     CRITERIA,
-    TUNED,
     GainTrial,
     Limit,
     Objective,
@@ -26,11 +30,12 @@ from coop_drake.tuning import (
     read_weights,
     search,
     tunable_parameters,
-    write_gains,
-    write_trials,
 )
 from coop_drake.tuning.search import load_optimizer
 from coop_drake.viz.tuning_figure import write_tuning_figure
+
+_TUNED = "tuned"
+"""Name of the gain set that is written, and of the folder it is in."""
 
 _PATIENCE = 2.0
 """A trial is ended when it takes this many times as long as before, or as a limit allows [-]."""
@@ -66,17 +71,20 @@ def tune(
     task = read_task(scenario, gains, reporter)
     start = task.scenario.gain_sets[task.scenario.selected_gains]
     parameters = tunable_parameters(start, request.vary)
-    folder = ResultFolder.of(task.name, out, "plan", "tuning", below=TUNED)
+    folder = ResultFolder.of(task.name, out, "plan", "tuning", below=_TUNED)
     plan = plan_of(task, folder, reporter)
     if plan is None:
         return reporter.code
     runner = TrialRunner(task.scenario, plan, map_cells(task, plan, reporter))
     with reporter.stage("before"):
-        before = runner.try_gains(start)
+        before = runner.simulate(start)
     objective = Objective(weights, limits, before.outcome.values)
     found = _search(task, runner, before, parameters, objective, request, reporter)
+    if not found.interrupted:
+        with reporter.stage("verifying"):
+            found.verify(runner.simulate)
     folder.begin("tuning")
-    write_trials(found, folder.path / "trials.json")
+    _write_trials(found, folder.path / "trials.json")
     if found.interrupted:  # Drawing would take longer than Ctrl-C may.
         return _interrupted(found, request, folder.path, reporter)
     write_tuning_figure(found, folder.path / "tuning.png")
@@ -98,7 +106,7 @@ def _search(
     count = min(request.workers or os.cpu_count() or 1, request.runs)
     with (
         reporter.stage("searching", "search") as progress,
-        Workers(task.scenario.path, runner.plan, runner.maps, longest=longest, count=count) as workers,
+        Workers(task.scenario.path, runner, before, longest=longest, count=count) as workers,
     ):
         return search(
             before,
@@ -124,11 +132,10 @@ def _interrupted(found: Search, request: Request, folder: Path, reporter: Report
 def _verified(
     task: Task, runner: TrialRunner, found: Search, request: Request, folder: Path, reporter: Reporter
 ) -> ExitCode:
-    """Simulate the whole plan with the best gains, and a plan that is made anew with them."""
-    best = found.best.gains
-    with reporter.stage("verifying"):
-        after = runner.try_gains(best).outcome
-        anew = runner.replan(task.problem, best)
+    """Write the best gains, which Drake's loop has run, and simulate a plan that is made anew with them."""
+    after = found.best.outcome
+    with reporter.stage("planning anew"):
+        anew = runner.replan(task.problem, found.best.gains)
     kept = found.objective.kept(after)
     state = (
         "Verified: arrives, keeps all limits." if kept else "Not good: a limit is broken or the run failed."
@@ -150,9 +157,31 @@ def _write(found: Search, request: Request, folder: Path, reporter: Reporter, st
         f"Better: {', '.join(request.criteria)}; kept: {', '.join(request.limits) or 'no limit'}.",
         f"{len(found.trials) - 1} runs tried, seed {request.seed}. {state}",
     )
-    path = write_gains(found.best.gains, remarks, folder / "gains.yaml")
+    path = _write_gains(found.best.gains, remarks, folder / "gains.yaml")
     reporter.facts["gains_file"] = str(path)
     reporter.say(f"The gain set is in {escape(str(path))}; use it with --gains {escape(str(path))}")
+
+
+def _write_gains(gains: GainSet, remarks: Sequence[str], path: Path) -> Path:
+    """Write a gain set with comments before it, one line each."""
+    comments = "".join(f"# {remark}\n" for remark in remarks)
+    return write_atomically(path, (comments + dump_gains(_TUNED, gains)).encode())
+
+
+def _write_trials(found: Search, path: Path) -> Path:
+    """Write every trial in the order of the search, the run before tuning first."""
+    rows = []
+    for trial, score in zip(found.trials, found.scores, strict=True):
+        outcome = asdict(trial.outcome)
+        outcome["share_done"] = outcome.pop("fraction_done")
+        rows.append({"score": score, "loop": trial.loop, **outcome, "gains": asdict(trial.gains)})
+    document = {
+        "weights": dict(found.objective.weights),
+        "limits": [asdict(limit) for limit in found.objective.limits],
+        "best": found.trials.index(found.best),
+        "trials": rows,
+    }
+    return write_atomically(path, json.dumps(document, indent=1).encode() + b"\n")
 
 
 def _show(reporter: Reporter, title: str, found: Search, after: RunOutcome, anew: RunOutcome | None) -> None:

@@ -7,7 +7,7 @@ from coop_drake.compiled_loop.drakes_loop import (
     simulate_fused,
     simulate_sampled,
 )
-from coop_drake.compiled_loop.preparing import CompiledTransport, prepare
+from coop_drake.compiled_loop.preparing import CompiledTransport, prepare, with_gains
 from coop_drake.compiled_loop.running import RunOutcome, run, run_many
 
 __all__ = [
@@ -21,4 +21,5 @@ __all__ = [
     "run_many",
     "simulate_fused",
     "simulate_sampled",
+    "with_gains",
 ]

@@ -11,7 +11,7 @@ from pydrake.systems.framework import DiagramBuilder
 from coop_drake.answers.plan import Plan
 from coop_drake.compiled_loop.arrays import LoopCells, LoopNominal, LoopPlant
 from coop_drake.diagram.fused import fused_team
-from coop_drake.diagram.knowledge import robot_knowledge
+from coop_drake.diagram.knowledge import arrival_goal, governed_cells, rest_tolerance, robot_knowledge
 from coop_drake.diagram.robot_controller import RobotKnowledge
 from coop_drake.errors import ScenarioError
 from coop_drake.fields import HarmonicMap, VelocityField
@@ -76,12 +76,12 @@ def prepare(scenario: Scenario, plan: Plan, maps: Sequence[HarmonicMap]) -> Comp
     if any(known.robot.has_springs for known in knowledge):
         raise _refusal(scenario, "directives", "a robot with springs", "models without springs")
     tree, fused = read_component_tree(team), fused_team(team, knowledge)
-    axes = np.array([i for r in team.robots for i in (0, *range(1 + r.q_slice.start, 1 + r.q_slice.stop))])
+    axes = _axes([robot.q_slice for robot in team.robots])
     return CompiledTransport(
         scenario,
         plan,
         tuple(robot.name for robot in team.robots),
-        _cells(scenario, plan, knowledge, axes),
+        _cells(scenario, plan, maps, [robot.q_slice for robot in team.robots]),
         fused,
         _plant(scenario, team, tree, fused),
         _nominal(plan, team, knowledge),
@@ -89,6 +89,18 @@ def prepare(scenario: Scenario, plan: Plan, maps: Sequence[HarmonicMap]) -> Comp
         team.position_index,
         plan.start[2:][axes],
     )
+
+
+def with_gains(transport: CompiledTransport, plan: Plan, maps: Sequence[HarmonicMap]) -> CompiledTransport:
+    """Return a transport along the same cells with other gains; neither plan may have a budget."""
+    ends = transport.team.first[2].tolist()
+    joints = [slice(*ends[k : k + 2]) for k in range(len(transport.robot_names))]
+    return replace(transport, plan=plan, cells=_cells(transport.scenario, plan, maps, joints))
+
+
+def _axes(joints: Sequence[slice]) -> IntArray:
+    """Return the axes (theta, q_k) of all robots among (theta, q), shape (M,)."""
+    return np.array([i for own in joints for i in (0, *range(1 + own.start, 1 + own.stop))])
 
 
 def _check(scenario: Scenario) -> None:
@@ -114,10 +126,12 @@ def _refusal(scenario: Scenario, key: str, found: object, allowed: str) -> Scena
     )
 
 
-def _cells(scenario: Scenario, plan: Plan, knowledge: Sequence[RobotKnowledge], axes: IntArray) -> LoopCells:
-    cells, stacks = knowledge[0].cells, tuple[list[FloatArray], ...](([], [], [], []))
+def _cells(scenario: Scenario, plan: Plan, maps: Sequence[HarmonicMap], joints: Sequence[slice]) -> LoopCells:
+    """Return all cells of a plan; ``joints`` says where those of every robot stand in q."""
+    cells, stacks = governed_cells(plan, maps), tuple[list[FloatArray], ...](([], [], [], []))
+    goals = [arrival_goal(scenario, plan, own) for own in joints]
     for cell, region in zip(cells, plan.cells, strict=True):
-        assert isinstance(cell.field, VelocityField)  # robot_knowledge makes no other
+        assert isinstance(cell.field, VelocityField)  # governed_cells makes no other
         found = cell.clearance.edges, BoundaryDistance(region.tidied).edges, *cell.field.kernel_arguments
         for stack, entry in zip(stacks, found, strict=True):
             stack.append(entry)
@@ -134,13 +148,13 @@ def _cells(scenario: Scenario, plan: Plan, knowledge: Sequence[RobotKnowledge], 
         regions,
         flats,
         fields,
-        np.array([law.table for law in axis_laws(plan, list(axes))]),
+        np.array([law.table for law in axis_laws(plan, list(_axes(joints)))]),
         np.array([[cell.lower for cell in plan.cells], [cell.upper for cell in plan.cells]]),
         np.array(numbers),
         np.array(plan.goal_pose[:2], dtype=float),
-        float(knowledge[0].position_tolerance),
-        np.concatenate([known.goal.place for known in knowledge]),
-        np.concatenate([np.array([known.goal.tolerances, known.goal.errors]) for known in knowledge], axis=1),
+        rest_tolerance(scenario, plan),
+        np.concatenate([goal.place for goal in goals]),
+        np.concatenate([np.array([goal.tolerances, goal.errors]) for goal in goals], axis=1),
     )
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
-from math import nan
+from math import nan, sqrt
 
 from coop_drake.compiled_loop.departing import believed, departures_of, memory_of, nominal_of
 from coop_drake.compiled_loop.looping import run_loop
@@ -33,7 +33,11 @@ from coop_drake.compiled_loop.watching import (
     ROBOT,
     SAMPLES,
     SHARE,
+    SQUARES,
     STALLED,
+    STEP,
+    TORQUE,
+    TURN,
     VALUE,
     WALL,
 )
@@ -52,6 +56,7 @@ class RunOutcome:
         reason: Why it did not arrive; empty if it did.
         time: Duration of the transport [s].
         steps: Number of samples.
+        cell: The cell at the end.
         funnel_margin: Distance of an axis to a bound of its funnel [rad or m].
         funnel_axis: The axis: ``angle`` or a joint's name.
         funnel_cell: The cell.
@@ -65,12 +70,17 @@ class RunOutcome:
             a budget [-].
         peak_force: Largest force of a base [N].
         peak_torque: Largest effort of a joint [N m or N]; NaN for a team without joints.
+        peak_base_torque: Largest torque of a base [N m].
+        force_rate: Largest change of a base's force from sample to sample, over the period [N/s].
+        mean_force: Root mean square force over samples and bases [N].
+        peak_turning: Largest mean angular acceleration of the object over a period [rad/s^2].
     """
 
     arrived: bool
     reason: str
     time: float
     steps: int
+    cell: int
     funnel_margin: float
     funnel_axis: str
     funnel_cell: int
@@ -81,6 +91,15 @@ class RunOutcome:
     alarm_share: float
     peak_force: float
     peak_torque: float
+    peak_base_torque: float
+    force_rate: float
+    mean_force: float
+    peak_turning: float
+
+    @property
+    def clearance(self) -> float:
+        """Smallest distance of any body to a wall, or to another body that it must not touch [m]."""
+        return min(self.wall_clearance, self.body_clearance)
 
 
 def run(
@@ -125,6 +144,7 @@ def _outcome(transport: CompiledTransport, figures: FloatArray, period: float) -
         reason="" if arrived else _reason(transport, figures, axes, period),
         time=float(figures[SAMPLES] * period),
         steps=int(figures[SAMPLES]),
+        cell=int(figures[CELL]),
         funnel_margin=float(figures[FUNNEL]),
         funnel_axis=axes[int(figures[FUNNEL_AXIS])],
         funnel_cell=int(figures[FUNNEL_CELL]),
@@ -135,6 +155,10 @@ def _outcome(transport: CompiledTransport, figures: FloatArray, period: float) -
         alarm_share=float(figures[ALARM]),
         peak_force=float(figures[FORCE]),
         peak_torque=float(figures[EFFORT]) if transport.plan.joint_names else nan,
+        peak_base_torque=float(figures[TORQUE]),
+        force_rate=float(figures[STEP]) / period,
+        mean_force=sqrt(figures[SQUARES] / (figures[SAMPLES] + 1.0)),
+        peak_turning=float(figures[TURN]) / period,
     )
 
 

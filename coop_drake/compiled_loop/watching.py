@@ -23,7 +23,7 @@ from coop_drake.laws.axis_table import bounds_of
 from coop_drake.systems.team_kernels import FusedTeam
 from coop_drake.tree.pose import FloatArray
 
-FIGURES = 16
+FIGURES = 20
 (
     ENDED,
     PLACE,
@@ -41,12 +41,17 @@ FIGURES = 16
     CELL,
     ROBOT,
     ALARM,
+    TORQUE,
+    STEP,
+    SQUARES,
+    TURN,
 ) = range(FIGURES)
 """Figures of a run: how it ended, the axis if one ended it, the smallest distance of an axis to a bound of
 its funnel, this axis and its cell, smallest distances of the position to the boundary of its cell, of bodies
 to walls and to each other, the largest share of the budget, largest force and joint effort, number of
-samples, the value and the cell at the end, the robot that ended it, and the largest measured departure over
-its level."""
+samples, the value and the cell at the end, the robot that ended it, the largest measured departure over its
+level, the largest torque of a base, the largest change of a base's force from sample to sample, the sum over
+all samples of the bases' mean squared force, and the largest change of the object's rate of rotation."""
 
 (
     RUNS,
@@ -71,21 +76,26 @@ class WatchRoom(NamedTuple):
         z: The configuration of now, shape (3 + n,) [m, rad].
         region: The cell, the distance of the position to its boundary when that was measured last, and the
             position then, shape (4,) [m].
+        before: Forces (x, y) of all bases at the sample before, then the object's rate of rotation; NaN at
+            the first one, shape (2 N + 1,) [N, rad/s].
         clearances: Those of all bodies.
     """
 
     z: FloatArray
     region: FloatArray
+    before: FloatArray
     clearances: Clearances
 
 
 @compiled
 def watch_room(plant: LoopPlant) -> WatchRoom:
     """Return room for a run that has not begun."""
-    region, n = np.empty(4), plant.tree.shape[0] + 2
+    region, n, before = np.empty(4), plant.tree.shape[0] + 2, np.empty(2 * plant.bases.size - 1)
     for i in range(4):
         region[i] = np.nan
-    return WatchRoom(np.empty(n), region, clearance_room(n, plant.shapes))
+    for i in range(before.size):
+        before[i] = np.nan
+    return WatchRoom(np.empty(n), region, before, clearance_room(n, plant.shapes))
 
 
 @compiled
@@ -131,7 +141,8 @@ def watch(
     _watch_cell(sample, cell, cells, plant, nominal, departures, memory, room, figures)
     watch_distances(z, plant, room.clearances, figures)
     _watch_departures(sample, cell, z, team, plant, nominal, memory, figures)
-    _watch_efforts(team, memory, figures)
+    _watch_efforts(team, memory, room.before, figures)
+    _watch_rotation(memory.state[team.places[1, 2]], room.before, figures)
     _watch_alarms(nominal, memory, figures)
     if cell + 1 == cells.rows.shape[0] and left_by_all(cell, memory):
         away = _share_of_tolerance(z, cells, team)
@@ -228,15 +239,34 @@ def _use(share: float, figures: FloatArray) -> None:
 
 
 @compiled
-def _watch_efforts(team: FusedTeam, memory: LoopMemory, figures: FloatArray) -> None:
-    """Measure the largest force of a base and the largest effort of a joint."""
-    for k in range(team.yaws.size):
+def _watch_efforts(team: FusedTeam, memory: LoopMemory, before: FloatArray, figures: FloatArray) -> None:
+    """Measure forces and torques of the bases, and the largest effort of a joint.
+
+    ``before`` holds what it held at the last sample, and receives the forces of now, see ``WatchRoom``.
+    """
+    robots = team.yaws.size
+    for k in range(robots):
         own = 3 * k + team.first[2, k]
         x, y = memory.efforts[1, own], memory.efforts[1, own + 1]
         if abs(x) + abs(y) > figures[FORCE]:  # It is at least the force, and quicker to compute.
             figures[FORCE] = max(figures[FORCE], hypot(x, y))
+        figures[TORQUE] = max(figures[TORQUE], abs(memory.efforts[1, own + 2]))
+        figures[SQUARES] += (x * x + y * y) / robots
+        step = hypot(x - before[2 * k], y - before[2 * k + 1])
+        if step > figures[STEP]:
+            figures[STEP] = step
+        before[2 * k], before[2 * k + 1] = x, y
         for i in range(team.first[2, k + 1] - team.first[2, k]):
             figures[EFFORT] = max(figures[EFFORT], abs(memory.efforts[1, own + 3 + i]))
+
+
+@compiled
+def _watch_rotation(rate: float, before: FloatArray, figures: FloatArray) -> None:
+    """Measure the largest change of the object's rate of rotation [rad/s] from sample to sample."""
+    turn = abs(rate - before[-1])
+    if turn > figures[TURN]:
+        figures[TURN] = turn
+    before[-1] = rate
 
 
 @compiled

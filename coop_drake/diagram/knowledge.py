@@ -41,17 +41,7 @@ def robot_knowledge(
         PlanError: The plan belongs to another team, or the number of maps is not the number of cells.
     """
     _check(plan, maps, team)
-    cells = [
-        GovernedCell(
-            BoundaryDistance(plan.governed(index)),
-            _field(field_map, transition.gains.governor_gain),
-            transition.gains,
-            before.gains,
-        )
-        for index, (transition, before, field_map) in enumerate(
-            zip(plan.transitions, (plan.transitions[0], *plan.transitions[:-1]), maps, strict=True)
-        )
-    ]
+    cells = governed_cells(plan, maps)
     factor, deployment, control = 1.0 + scenario.deployment.mass_error, scenario.deployment, scenario.control
     hold = hold_of(scenario, plan)
     delay = whole_periods(deployment.measurements.delay, deployment.period) if deployment.period else 0
@@ -64,7 +54,7 @@ def robot_knowledge(
             load_share=scenario.load_share(robot.name, len(team.robots)),
             plan=plan,
             cells=cells,
-            position_tolerance=scenario.goal.tolerances.position - (plan.tube.rest if plan.tube else 0.0),
+            position_tolerance=rest_tolerance(scenario, plan),
             period=deployment.period,
             sample_offset=deployment.of_robot(robot.name).sample_offset,
             predicted_periods=delay if control.predictor else 0,
@@ -78,6 +68,26 @@ def robot_knowledge(
         )
         for robot in team.robots
     ]
+
+
+def governed_cells(plan: Plan, maps: Sequence[HarmonicMap]) -> list[GovernedCell]:
+    """Return what a governor needs of every cell of a plan, given the map of every transition."""
+    return [
+        GovernedCell(
+            BoundaryDistance(plan.governed(index)),
+            _field(field_map, transition.gains.governor_gain),
+            transition.gains,
+            before.gains,
+        )
+        for index, (transition, before, field_map) in enumerate(
+            zip(plan.transitions, (plan.transitions[0], *plan.transitions[:-1]), maps, strict=True)
+        )
+    ]
+
+
+def rest_tolerance(scenario: Scenario, plan: Plan) -> float:
+    """Return how close to the goal the position that robots go by counts as arrived [m]."""
+    return float(scenario.goal.tolerances.position - (plan.tube.rest if plan.tube else 0.0))
 
 
 def hold_of(scenario: Scenario, plan: Plan) -> Hold | None:

@@ -1,15 +1,18 @@
-"""The objective of tuning: weighted criteria within limits, as one score for each run; smaller is better."""
+"""What is sought: criteria of runs, limits that they keep, and one score for each run; smaller is better."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from math import inf
+from typing import Literal
 
+import numpy as np
+
+from coop_drake.answers.log import SimulationLog
 from coop_drake.errors import TuningError
-from coop_drake.tuning.criteria import CRITERIA
-from coop_drake.tuning.trial import RunOutcome
+from coop_drake.laws import GainSet
 
 _LIMITS_BROKEN = 1e3
 """Smallest score of a run that breaks a limit; runs that keep all limits stay below [-]."""
@@ -18,6 +21,129 @@ _RUN_FAILED = 1e6
 """Smallest score of a run that fails; runs that arrive stay below [-]."""
 
 _LIMIT = re.compile(r"\s*(\w+)\s*(<=|>=)\s*([0-9.eE+-]+)\s*(x?)\s*")
+
+
+@dataclass(frozen=True)
+class Criterion:
+    """One number by which runs are compared.
+
+    Attributes:
+        name: Name on the command line and in files.
+        label: Name in tables and figures.
+        unit: Unit of the number.
+        measure: Computes the number from the log of a run.
+        more_is_better: Whether larger numbers are better, as for margins.
+    """
+
+    name: str
+    label: str
+    unit: str
+    measure: Callable[[SimulationLog], float]
+    more_is_better: bool = False
+
+
+def _base_forces(log: SimulationLog) -> np.ndarray:
+    """Return the force of every base at every accepted step, shape (T, N) [N]."""
+    return np.hypot(log.base_wrenches[..., 0], log.base_wrenches[..., 1])
+
+
+def _mean_force(log: SimulationLog) -> float:
+    """Return the root mean square force over time and bases; steps differ in length and are weighted [N]."""
+    squares = (_base_forces(log) ** 2).mean(axis=1)
+    return float(np.sqrt(np.trapezoid(squares, log.times) / log.times[-1]))
+
+
+def _turning(log: SimulationLog) -> float:
+    """Return the largest mean angular acceleration of the object over an accepted step [rad/s^2]."""
+    steps = np.diff(log.times)
+    moved = steps > 0.0
+    return float(np.abs(np.diff(log.object_twist[:, 2])[moved] / steps[moved]).max(initial=0.0))
+
+
+CRITERIA = {
+    criterion.name: criterion
+    for criterion in (
+        Criterion("time", "duration", "s", lambda log: float(log.times[-1])),
+        Criterion("peak_force", "peak base force", "N", lambda log: float(_base_forces(log).max())),
+        Criterion("force_rate", "peak rate of base forces", "N/s", lambda log: log.peak_force_rate),
+        Criterion("mean_force", "root mean square base force", "N", _mean_force),
+        Criterion(
+            "peak_base_torque",
+            "peak base torque",
+            "N m",
+            lambda log: float(np.abs(log.base_wrenches[..., 2]).max()),
+        ),
+        Criterion(
+            "peak_torque",
+            "peak joint torque",
+            "N m",
+            lambda log: float(np.abs(log.joint_torques).max(initial=0.0)),
+        ),
+        Criterion("peak_turning", "peak angular acceleration", "rad/s²", _turning),
+        Criterion(
+            "clearance",
+            "clearance to walls and bodies",
+            "m",
+            lambda log: float(min(log.workspace_clearance.min(), log.body_clearance.min())),
+            more_is_better=True,
+        ),
+        Criterion(
+            "cell_margin",
+            "margin to the cells' boundaries",
+            "m",
+            lambda log: float(log.cell_clearance.min()),
+            more_is_better=True,
+        ),
+        Criterion(
+            "funnel_margin",
+            "margin to the funnel bounds",
+            "rad",
+            lambda log: float(log.funnel_margin.min()),
+            more_is_better=True,
+        ),
+    )
+}
+"""All criteria by name."""
+
+
+@dataclass(frozen=True)
+class RunOutcome:
+    """Result of a simulated run.
+
+    Attributes:
+        arrived: Whether the object came to rest at the goal and no invariant was violated.
+        fraction_done: Fraction of the plan's cells that were passed [-].
+        values: Value of every criterion by name.
+        violation: The invariant that was violated; empty if none was.
+    """
+
+    arrived: bool
+    fraction_done: float
+    values: Mapping[str, float]
+    violation: str
+
+
+def outcome_of(log: SimulationLog, cells: int) -> RunOutcome:
+    """Measure a run of a plan with so many cells by every criterion."""
+    arrived = log.reached and not log.violation
+    done = 1.0 if arrived else float(log.cell_index[-1]) / cells
+    values = {name: criterion.measure(log) for name, criterion in CRITERIA.items()}
+    return RunOutcome(arrived, done, values, log.violation)
+
+
+@dataclass(frozen=True)
+class GainTrial:
+    """A gain set and the result of its run.
+
+    Attributes:
+        gains: The gain set.
+        outcome: Result of the run.
+        loop: The loop that was run, Drake's or the compiled one.
+    """
+
+    gains: GainSet
+    outcome: RunOutcome
+    loop: Literal["drake", "compiled"] = "drake"
 
 
 def read_weights(texts: Sequence[str]) -> dict[str, float]:

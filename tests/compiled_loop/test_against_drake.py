@@ -6,8 +6,10 @@ from functools import cache
 import numpy as np
 import pytest
 
-from coop_drake.compiled_loop import prepare, run, run_many
+from coop_drake.compiled_loop import prepare, run, run_many, with_gains
 from coop_drake.errors import RefusalError, ScenarioError
+from coop_drake.laws import ScheduledGains
+from coop_drake.planning import reschedule
 from coop_drake.plant.configuration import displacement
 from coop_drake.scenario import (
     ActuatorLimits,
@@ -30,6 +32,7 @@ from coop_drake.scenario import (
     WheelSlip,
 )
 from coop_drake.simulation import build_maps, simulate
+from coop_drake.tuning.objective import outcome_of
 from coop_drake.verification.runs import Rows, budget_share
 from coop_drake.verification.runs.ends import check_start
 from tests.support.small_loop import small_maps, small_problem
@@ -118,6 +121,23 @@ def test_cells_are_measured_at_the_same_samples():
     row, axis = np.unravel_index(np.argmin(margins), margins.shape)
     assert outcome.funnel_axis == ("angle", *log.joint_names)[axis]
     assert outcome.funnel_cell == log.cell_index[row]
+
+
+@pytest.mark.parametrize("name", ["rate", "noise", "push"])
+def test_criteria_of_tuning_are_those_of_the_log(name):
+    outcome, log = both(prepared(), CASES[name], small_maps())
+    for criterion, expected in outcome_of(log, len(prepared().plan.cells)).values.items():
+        assert getattr(outcome, criterion) == pytest.approx(expected, rel=3e-3), criterion
+    assert outcome.cell == len(prepared().plan.cells) - 1
+
+
+def test_other_gains_change_the_cells_alone():
+    transport, plan = prepared(), reschedule(prepared().plan, ScheduledGains(age_phase=0.3), "other")
+    found, expected = (
+        with_gains(transport, plan, small_maps()),
+        prepare(transport.scenario, plan, small_maps()),
+    )
+    assert repr(run(found)) == repr(run(expected)) != repr(run(transport))
 
 
 @pytest.mark.parametrize("team", ["base", "elbow"])

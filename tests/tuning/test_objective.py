@@ -9,7 +9,7 @@ import pytest
 
 from coop_drake.errors import TuningError
 from coop_drake.tuning import CRITERIA, Limit, Objective, RunOutcome, read_weights
-from coop_drake.tuning.trial import outcome_of
+from coop_drake.tuning.objective import outcome_of
 from tests.support.cases import case
 from tests.support.synthetic_log import SECONDS, synthetic_log
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import combinations, product
 from math import log
 
@@ -11,7 +12,7 @@ import pytest
 from coop_drake.errors import TuningError
 from coop_drake.laws import FixedGains, ScheduledGains
 from coop_drake.tuning import GainTrial, Objective, RunOutcome, search, tunable_parameters
-from coop_drake.tuning.parameters import to_fractions, with_fractions
+from coop_drake.tuning.search import to_fractions, with_fractions
 
 SETS = [ScheduledGains(), FixedGains()]
 
@@ -88,6 +89,22 @@ def test_the_same_seed_gives_the_same_gains_however_runs_are_spread():
 @pytest.mark.parametrize("runs", [1, 7])
 def test_fewer_runs_than_a_generation_are_made_and_no_more(runs):
     assert len(searched(runs=runs).trials) == 1 + runs
+
+
+def test_the_best_trial_is_simulated_by_drakes_loop_until_one_stays_the_best():
+    """In Drake's loop forces are larger for the three best trials, and not for the fourth."""
+    found = searched(lambda gain_sets: (replace(bowl(gains), loop="compiled") for gains in gain_sets))
+    best, simulated = [found.trials[k].gains for k in np.argsort(found.scores)[:4]], []
+
+    def simulate(gains):
+        simulated.append(gains)
+        made = bowl(gains)
+        worse = {**made.outcome.values, "peak_force": 150.0}
+        return made if len(simulated) == 4 else replace(made, outcome=replace(made.outcome, values=worse))
+
+    found.verify(simulate)
+    assert simulated == best
+    assert found.best == bowl(best[-1])
 
 
 def test_ctrl_c_ends_the_search_with_what_was_found():
