@@ -31,7 +31,8 @@ def test_the_compiled_loop_measures_trials_as_drakes_loop_does(rate, close):
     for expected in simulated(rate):
         found = trials.estimate(expected.gains)
         assert (found.loop, found.outcome.arrived) == ("compiled", True)
-        assert found.outcome.values["time"] == pytest.approx(expected.outcome.values["time"], rel=0.02)
+        # A sampled team says that it has arrived by a mean over a tenth of a second.
+        assert found.outcome.values["time"] == pytest.approx(expected.outcome.values["time"], abs=0.1)
         for name in CRITERIA:
             assert found.outcome.values[name] == pytest.approx(expected.outcome.values[name], rel=close), name
 
