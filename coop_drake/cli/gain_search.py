@@ -106,7 +106,7 @@ def _search(
     count = min(request.workers or os.cpu_count() or 1, request.runs)
     with (
         reporter.stage("searching", "search") as progress,
-        Workers(task.scenario.path, runner, longest=longest, count=count) as workers,
+        Workers(task.scenario.path, runner.plan, runner.maps, longest=longest, count=count) as workers,
     ):
         return search(
             before,

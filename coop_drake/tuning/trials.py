@@ -98,17 +98,20 @@ class Workers:
 
     Args:
         scenario: The scenario file; every process reads it.
-        runner: Holds the plan and its maps.
+        plan: Its plan.
+        maps: The plan's maps.
         longest: Runs that last longer count as failed [s].
         count: Number of processes.
     """
 
-    def __init__(self, scenario: Path, runner: TrialRunner, *, longest: float, count: int) -> None:
+    def __init__(
+        self, scenario: Path, plan: Plan, maps: Sequence[HarmonicMap], *, longest: float, count: int
+    ) -> None:
         self._pool = ProcessPoolExecutor(
             count,
             mp_context=multiprocessing.get_context("spawn"),  # Forks of a process with threads may hang.
             initializer=_prepare,
-            initargs=(scenario, runner.plan, runner.maps, longest),
+            initargs=(scenario, plan, tuple(maps), longest),
             max_tasks_per_child=_TRIALS_EACH,
         )
 
