@@ -14,7 +14,7 @@ from benchmarks.rows import Row
 from benchmarks.tasks import Task
 from coop_drake import Plan, load_scenario
 from coop_drake.diagram import brakes_of, build_station, control_period
-from coop_drake.fields import HarmonicMap
+from coop_drake.harmonic_maps import HarmonicMap
 from coop_drake.laws.braking import braking_effort
 from coop_drake.messages import SUPERVISOR
 from coop_drake.nodes.membership import TOLERATED

@@ -17,7 +17,7 @@ from benchmarks.domains import Domain
 from benchmarks.rows import Row
 from benchmarks.timing import best_seconds, seconds
 from coop_drake.errors import FieldError
-from coop_drake.fields import HarmonicMap, skeletons
+from coop_drake.harmonic_maps import HarmonicMap, solve
 
 __all__ = ["ablation_rows", "cost_rows", "map_rows"]
 
@@ -63,7 +63,7 @@ def ablation_rows(name: str, domain: Domain) -> list[Row]:
     """CPU time of solving a map with compressed clusters of nodes, beside one dense system of all nodes."""
     _mapped(domain)
     compressed = _best(lambda: _mapped(domain))
-    with patch.object(skeletons, "DENSE", sys.maxsize):
+    with patch.object(solve, "DENSE", sys.maxsize):
         dense = seconds(lambda: _mapped(domain), process_time)
     return [Row(f"{name}/cpu_seconds", compressed, "s", "without compression", dense)]
 

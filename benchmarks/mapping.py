@@ -15,8 +15,7 @@ from benchmarks.tasks import Task
 from benchmarks.timing import best_seconds
 from benchmarks.transport import base_plan
 from coop_drake.answers import Plan
-from coop_drake.fields import HarmonicMap, MapStore, VelocityField
-from coop_drake.fields.tolerance import TOLERANCE
+from coop_drake.harmonic_maps import TOLERANCE, HarmonicMap, MapStore, VelocityField
 from coop_drake.simulation import build_maps
 
 __all__ = ["base_rows", "mapping_tasks"]

@@ -14,7 +14,7 @@ from benchmarks.rows import Row
 from benchmarks.tasks import Task
 from coop_drake import Plan, SimulationLog, load_scenario
 from coop_drake.diagram import control_period
-from coop_drake.fields import HarmonicMap
+from coop_drake.harmonic_maps import HarmonicMap
 from coop_drake.messages import SUPERVISOR, local_book, name_of
 from coop_drake.nodes import LocalTeam, robots_of, run_world
 from coop_drake.scenario import Scenario

@@ -12,7 +12,7 @@ from pydrake.systems.framework import DiagramBuilder
 
 from coop_drake.answers import Found, Plan
 from coop_drake.errors import PlanError
-from coop_drake.fields import HarmonicMap
+from coop_drake.harmonic_maps import HarmonicMap
 from coop_drake.planning.planner import plan
 from coop_drake.plant import build_team_plant, planning_problem
 from coop_drake.plant.polygon_body import polygon_body_files, write_polygon_body

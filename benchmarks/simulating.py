@@ -23,7 +23,7 @@ from coop_drake.answers import Plan
 from coop_drake.answers.log import SimulationLog
 from coop_drake.compiled_loop import build_fused_loop, simulate_fused
 from coop_drake.diagram import Blocks, build_closed_loop
-from coop_drake.fields import HarmonicMap
+from coop_drake.harmonic_maps import HarmonicMap
 from coop_drake.plant import build_team_plant, set_configuration
 from coop_drake.scenario import Deployment, Scenario
 from coop_drake.simulation import configure_simulator, simulate

@@ -15,7 +15,7 @@ from benchmarks.tasks import Task
 from coop_drake import Found, Plan, load_scenario, plan
 from coop_drake.diagram import control_period
 from coop_drake.errors import PlanError
-from coop_drake.fields import HarmonicMap
+from coop_drake.harmonic_maps import HarmonicMap
 from coop_drake.nodes import DirectExchange, simulate_apart
 from coop_drake.nodes.membership import Stop
 from coop_drake.scenario import Scenario

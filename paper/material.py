@@ -8,7 +8,7 @@ from pydrake.systems.framework import DiagramBuilder
 
 from coop_drake.answers import PlanningProblem
 from coop_drake.errors import ScenarioError
-from coop_drake.fields import MapStore
+from coop_drake.harmonic_maps import MapStore
 from coop_drake.laws import FixedGains
 from coop_drake.plant import build_team_plant, planning_problem
 from coop_drake.plant.team import ObjectInertia

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from coop_drake.answers import Found, Plan, PlanningProblem
 from coop_drake.answers.log import SimulationLog
 from coop_drake.errors import PlanError
-from coop_drake.fields import MapStore
+from coop_drake.harmonic_maps import MapStore
 from coop_drake.planning import reschedule
 from coop_drake.planning.planner import plan
 from coop_drake.scenario import Scenario

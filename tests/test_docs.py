@@ -166,8 +166,8 @@ def test_in_the_site_a_room_is_its_page_of_the_api():
     assert for_site(text, PurePosixPath("how_to/page.md")) == (
         "[funnel](../reference/api/systems.md), [plan](../coop_drake/planning.md)"
     )
-    assert for_site("[one](../coop_drake/fields)", PurePosixPath("page.md")) == (
-        "[one](reference/api/fields.md)"
+    assert for_site("[one](../coop_drake/harmonic_maps)", PurePosixPath("page.md")) == (
+        "[one](reference/api/harmonic_maps.md)"
     )
 
 
@@ -175,7 +175,7 @@ def test_every_room_has_a_page():
     pages = {page.title: page.text for page in api_pages(ROOT)}
     rooms = {path.parent.name for path in (ROOT / "coop_drake").glob("*/__init__.py")}
     assert set(pages) == rooms | {"coop_drake"}
-    assert "::: coop_drake.fields.harmonic_map\n" in pages["fields"]
+    assert "::: coop_drake.harmonic_maps.harmonic_map\n" in pages["harmonic_maps"]
     assert "kernels" not in "".join(pages.values())
 
 

@@ -19,7 +19,7 @@ WITHOUT_DRAKE = [
     "tree",
     "geometry",
     "drawing",
-    "fields",
+    "harmonic_maps",
     "laws",
     "answers",
     "planning",

@@ -13,8 +13,8 @@ from coop_drake.answers import Found, Plan, load_plan, save_plan
 from coop_drake.answers.digest import content_digest
 from coop_drake.campaign.variation import Run, Variation
 from coop_drake.errors import PlanError
-from coop_drake.fields import HarmonicMap, MapStore
 from coop_drake.files import cache_folder
+from coop_drake.harmonic_maps import HarmonicMap, MapStore
 from coop_drake.plant import planning_problem
 from coop_drake.plant.budgets import budget_of
 from coop_drake.plant.scenario_digest import models_digest

@@ -74,10 +74,10 @@ def prepare_simulation(scenario: Scenario) -> None:
     """
     from pydrake.systems.framework import DiagramBuilder
 
-    from coop_drake import fields, simulation
+    from coop_drake import harmonic_maps, simulation
     from coop_drake.plant import build_robot_plant, build_team_plant
 
-    for module, name in ((simulation, "simulate"), (fields, "HarmonicMap")):
+    for module, name in ((simulation, "simulate"), (harmonic_maps, "HarmonicMap")):
         getattr(module, name)
     for robot in build_team_plant(scenario, DiagramBuilder()).robots:
         build_robot_plant(scenario, robot.index)

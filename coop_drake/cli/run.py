@@ -50,7 +50,7 @@ if TYPE_CHECKING:
     from coop_drake.answers import Plan
     from coop_drake.answers.log import SimulationLog
     from coop_drake.diagram import Blocks
-    from coop_drake.fields import HarmonicMap
+    from coop_drake.harmonic_maps import HarmonicMap
     from coop_drake.messages.faults import Faults
     from coop_drake.viz import LivePage
 

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from coop_drake.answers import Plan, PlanningProblem, PlanningResult
     from coop_drake.answers.log import SimulationLog
-    from coop_drake.fields import HarmonicMap
+    from coop_drake.harmonic_maps import HarmonicMap
 
 _ROWS = (
     ("answer", "{answer}"),

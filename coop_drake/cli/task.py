@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from coop_drake.answers import Plan, PlanningProblem
     from coop_drake.cli.reporter import Reporter
     from coop_drake.cli.results import ResultFolder
-    from coop_drake.fields import HarmonicMap, MapStore
+    from coop_drake.harmonic_maps import HarmonicMap, MapStore
     from coop_drake.scenario import Scenario
 
 
@@ -66,7 +66,7 @@ def read_task(path: Path, gains: str | None = None, reporter: Reporter | None = 
 
 def map_cache() -> MapStore:
     """The maps in the folder that the system has for a user's caches, or that ``COOP_DRAKE_CACHE`` names."""
-    from coop_drake.fields import MapStore
+    from coop_drake.harmonic_maps import MapStore
 
     return MapStore(cache_folder("maps"))
 

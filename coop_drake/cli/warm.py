@@ -14,7 +14,7 @@ from coop_drake.cli.reporter import Reporter
 from coop_drake.cli.task import Task, read_task
 from coop_drake.progress import Progress
 
-_SIDE_BY_SIDE = ("coop_drake.planning.warm_up", "coop_drake.fields.warm_up")
+_SIDE_BY_SIDE = ("coop_drake.planning.warm_up", "coop_drake.harmonic_maps.warm_up")
 """Modules that compile kernels when they are run; they share none."""
 
 _SIMULATED_SECONDS = 0.05

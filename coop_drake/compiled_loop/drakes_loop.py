@@ -18,7 +18,7 @@ from coop_drake.compiled_loop.sampled_team import SampledTeam
 from coop_drake.compiled_loop.telling import ALARM, GOVERNOR, MARGIN, POSE, READY, SHOWN, WANTED
 from coop_drake.diagram.closed_loop import ClosedLoop, build_closed_loop
 from coop_drake.diagram.station import build_driven_station
-from coop_drake.fields import HarmonicMap
+from coop_drake.harmonic_maps import HarmonicMap
 from coop_drake.plant.configuration import displacement
 from coop_drake.progress import Progress
 from coop_drake.scenario import Deployment, Scenario

@@ -14,8 +14,8 @@ from coop_drake.diagram.fused import fused_team
 from coop_drake.diagram.knowledge import arrival_goal, governed_cells, rest_tolerance, robot_knowledge
 from coop_drake.diagram.robot_controller import RobotKnowledge
 from coop_drake.errors import ScenarioError
-from coop_drake.fields import HarmonicMap, VelocityField
 from coop_drake.geometry.boundary import BoundaryDistance
+from coop_drake.harmonic_maps import HarmonicMap, VelocityField
 from coop_drake.laws.hand_over import governed_gains
 from coop_drake.plant import TeamPlant, base_chain, build_team_plant, read_component_tree, read_team_tree
 from coop_drake.scenario import Scenario

@@ -16,7 +16,7 @@ from coop_drake.diagram.knowledge import hold_of, robot_knowledge
 from coop_drake.diagram.loop import Loop
 from coop_drake.diagram.robot_controller import Replacements, build_robot_controller
 from coop_drake.diagram.station import build_driven_station, build_station
-from coop_drake.fields import HarmonicMap
+from coop_drake.harmonic_maps import HarmonicMap
 from coop_drake.plant.configuration import displacement
 from coop_drake.scenario import Scenario
 from coop_drake.systems import CellPlanner, HoldSupervisor

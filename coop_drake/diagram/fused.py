@@ -12,7 +12,7 @@ from pydrake.systems.primitives import Demultiplexer, Integrator
 from coop_drake.diagram.robot_controller import RobotKnowledge
 from coop_drake.diagram.station import TransportStation
 from coop_drake.errors import ScenarioError
-from coop_drake.fields import VelocityField
+from coop_drake.harmonic_maps import VelocityField
 from coop_drake.plant import TeamPlant, base_chain, robot_chain
 from coop_drake.scenario import Control, Deployment, Hold, Scenario
 from coop_drake.systems import (

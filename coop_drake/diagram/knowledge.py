@@ -10,8 +10,8 @@ import numpy as np
 from coop_drake.answers.plan import Plan
 from coop_drake.diagram.robot_controller import RobotKnowledge
 from coop_drake.errors import PlanError, ScenarioError
-from coop_drake.fields import HarmonicMap, VelocityField
 from coop_drake.geometry.boundary import BoundaryDistance
+from coop_drake.harmonic_maps import HarmonicMap, VelocityField
 from coop_drake.laws.arrival import ArrivalGoal
 from coop_drake.laws.disturbance import observer_gains
 from coop_drake.laws.governor import FIELD_SPEED, slowdown_radius

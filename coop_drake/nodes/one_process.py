@@ -11,7 +11,7 @@ from coop_drake.answers.log import SimulationLog
 from coop_drake.answers.plan import Plan
 from coop_drake.diagram import brakes_of, build_world, control_period
 from coop_drake.diagram.knowledge import hold_of, robot_knowledge
-from coop_drake.fields import HarmonicMap
+from coop_drake.harmonic_maps import HarmonicMap
 from coop_drake.laws.braking import Brake, braking_effort
 from coop_drake.messages import name_of
 from coop_drake.nodes.membership import Membership

@@ -19,7 +19,7 @@ from coop_drake.diagram import control_period
 from coop_drake.diagram.knowledge import hold_of, robot_knowledge
 from coop_drake.diagram.station import build_station
 from coop_drake.errors import CoopDrakeError
-from coop_drake.fields import HarmonicMap
+from coop_drake.harmonic_maps import HarmonicMap
 from coop_drake.interrupts import uninterrupted
 from coop_drake.messages import (
     SUPERVISOR,

@@ -12,7 +12,7 @@ from coop_drake.answers.log import SimulationLog
 from coop_drake.answers.plan import Plan
 from coop_drake.diagram import brakes_of, build_world, control_period
 from coop_drake.errors import MessagingError
-from coop_drake.fields import HarmonicMap
+from coop_drake.harmonic_maps import HarmonicMap
 from coop_drake.messages import AddressBook, Goodbye, KeyPair, WorldEnd, local_book, name_of
 from coop_drake.messages.faults import NO_FAULTS, Faults
 from coop_drake.messages.outgoing import Links

@@ -7,8 +7,8 @@ from typing import Annotated, Literal
 from shapely import Polygon
 
 from coop_drake.answers.problem import PlannerSettings
-from coop_drake.fields.tolerance import TOLERANCE
 from coop_drake.floor_plans.settings import Scale, Tolerance, Unit
+from coop_drake.harmonic_maps import TOLERANCE
 from coop_drake.laws.gains import FixedGains, GainSet, ScheduledGains
 from coop_drake.scenario.control import Control
 from coop_drake.scenario.deployment import Deployment

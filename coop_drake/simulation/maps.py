@@ -12,8 +12,7 @@ from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
 
 from coop_drake.answers.plan import Plan
 from coop_drake.errors import FieldError
-from coop_drake.fields import HarmonicMap, MapStore
-from coop_drake.fields.tolerance import TOLERANCE
+from coop_drake.harmonic_maps import TOLERANCE, HarmonicMap, MapStore
 
 _MOST_WORKERS = 8  # More of them wait for one another: between kernels they share one interpreter.
 

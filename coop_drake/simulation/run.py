@@ -14,7 +14,7 @@ from coop_drake.answers.plan import Plan
 from coop_drake.answers.plan_file import plan_digest
 from coop_drake.diagram import Replacements, build_closed_loop
 from coop_drake.diagram.knowledge import arrival_goal
-from coop_drake.fields import HarmonicMap
+from coop_drake.harmonic_maps import HarmonicMap
 from coop_drake.plant import read_component_tree
 from coop_drake.plant.scenario_digest import scenario_digest
 from coop_drake.progress import Progress

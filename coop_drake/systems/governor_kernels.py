@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from coop_drake.compiled import compiled
-from coop_drake.fields.flat_field import velocity_in_field
 from coop_drake.geometry.boundary import signed_distance
+from coop_drake.harmonic_maps.field import velocity_in_field
 from coop_drake.laws.governor import (
     driving_margin,
     governed_acceleration,

@@ -10,7 +10,7 @@ from pydrake.systems.framework import BasicVector, Context, DiscreteValues, Even
 
 from coop_drake.answers.position_tube import PositionTube
 from coop_drake.compiled import prepared
-from coop_drake.fields import VelocityField
+from coop_drake.harmonic_maps import VelocityField
 from coop_drake.laws.nominal import nominal_flow
 from coop_drake.systems.block import NUMBER, VECTOR, Block
 from coop_drake.systems.current_cell import CURRENT_CELL_SIZE, index_of

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from coop_drake.compiled import compiled
-from coop_drake.fields.flat_field import velocity_in_field
 from coop_drake.geometry.boundary import signed_distance
+from coop_drake.harmonic_maps.field import velocity_in_field
 from coop_drake.laws.governor import energy_margin, governor_velocity, tracking_energy
 from coop_drake.laws.hand_over import GOVERNOR_GAIN, SMOOTHING, STIFFNESS
 from coop_drake.laws.nominal import excursion, limited_step, reach_of, tracked_acceleration

@@ -9,8 +9,8 @@ from functools import cached_property
 from pydrake.systems.framework import BasicVector, Context
 
 from coop_drake.compiled import prepared
-from coop_drake.fields import VelocityField
 from coop_drake.geometry.boundary import BoundaryDistance
+from coop_drake.harmonic_maps import VelocityField
 from coop_drake.laws.gains import TransitionGains
 from coop_drake.laws.governor import driving_margin, governor_velocity, steady_clearance
 from coop_drake.laws.hand_over import SPEED_LIMIT, governed_gains

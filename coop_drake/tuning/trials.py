@@ -18,7 +18,7 @@ from coop_drake.answers import Found, Plan, PlanningProblem
 from coop_drake.compiled_loop import CompiledTransport, prepare, run, with_gains
 from coop_drake.compiled_loop.departing import check_deployment
 from coop_drake.errors import ScenarioError
-from coop_drake.fields import HarmonicMap
+from coop_drake.harmonic_maps import HarmonicMap
 from coop_drake.interrupts import uninterrupted
 from coop_drake.laws import GainSet
 from coop_drake.planning import reschedule

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from coop_drake.errors import FieldError
-from coop_drake.fields import MapStore
+from coop_drake.harmonic_maps import MapStore
 from coop_drake.simulation import build_maps
 from coop_drake.simulation.maps import TOLERANCE
 from tests.support.small_plan import small_plan

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from shapely import Point
 
-from coop_drake.fields import HarmonicMap, VelocityField
 from coop_drake.geometry import BoundaryDistance
+from coop_drake.harmonic_maps import HarmonicMap, VelocityField
 from coop_drake.laws import (
     energy_margin,
     funnel_acceleration,

@@ -8,7 +8,7 @@ from pydrake.systems.framework import DiagramBuilder
 
 from coop_drake.answers.plan import Plan
 from coop_drake.diagram import ClosedLoop, build_closed_loop
-from coop_drake.fields import HarmonicMap
+from coop_drake.harmonic_maps import HarmonicMap
 from coop_drake.laws import GainSet
 from coop_drake.plant import build_team_plant
 from coop_drake.scenario import Scenario

@@ -8,7 +8,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from shapely import Point, Polygon, affinity, box
 
-from coop_drake.fields import HarmonicMap, VelocityField, trace_streamlines
+from coop_drake.harmonic_maps import HarmonicMap, VelocityField, trace_streamlines
 from tests.support import domains
 
 FEW = settings(

@@ -6,7 +6,7 @@ import shapely
 from numpy.polynomial.legendre import leggauss
 from shapely import Point, Polygon
 
-from coop_drake.fields import HarmonicMap
+from coop_drake.harmonic_maps import HarmonicMap
 from tests.support import domains
 
 

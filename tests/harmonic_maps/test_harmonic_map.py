@@ -1,0 +1,419 @@
+"""Maps beside other solvers and known ones; their accuracy, near walls too, and what is refused."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+import shapely
+from shapely import Point, Polygon, affinity, box
+
+from coop_drake.errors import FieldError, UnmappableError
+from coop_drake.geometry import BoundaryDistance
+from coop_drake.harmonic_maps import HarmonicMap, harmonic_map
+from coop_drake.harmonic_maps.pictures import sample_boundary
+from tests.support import domains
+from tests.support.domains import inside
+from tests.support.lightning import Lightning
+from tests.support.real_cells import REAL_CELLS
+from tests.support.rectangle_map import rectangle_map
+from tests.support.single_layer import SingleLayer
+
+NAMED = {
+    "square": domains.square(),
+    "u_corridor": domains.u_corridor(),
+    "warehouse": domains.warehouse(),
+    "needle": domains.needle(10),
+    "blade": domains.blade(350),
+    "two_rooms": domains.two_rooms(0.01),
+    "bevelled": domains.bevelled(1e-3),
+    "rounded_room": domains.rounded_room(),
+    "maze": domains.maze(5),
+}
+
+
+@pytest.fixture(scope="module", params=NAMED)
+def mapped(request):
+    domain, goal = NAMED[request.param]
+    return HarmonicMap(domain, goal)
+
+
+def boundary_samples(region):
+    """Points of the outer ring, dense towards every vertex, and where they belong."""
+    ring = np.asarray(shapely.orient_polygons(region).exterior.coords)
+    length = np.hypot(*np.diff(ring, axis=0).T)
+    near = np.geomspace(1e-9, 0.5, 25)
+    part = np.concatenate((near, 1 - near))
+    s = np.concatenate([np.sum(length[:k]) + part * length[k] for k in range(len(length))])
+    points = np.concatenate([a + part[:, None] * (b - a) for a, b in pairwise(ring)])
+    angle = 2 * np.pi * s / length.sum()
+    return points, np.column_stack((np.cos(angle), np.sin(angle)))
+
+
+def test_rectangle_agrees_with_its_series():
+    domain = Polygon([(0, 0), (1.7, 0), (1.7, 0.9), (0, 0.9)])
+    points = domains.inside(domain, 300, clearance=0.03)
+    T, _ = HarmonicMap(domain, Point(1, 0.5))(points)
+    np.testing.assert_allclose(T, rectangle_map(1.7, 0.9, points), atol=2e-9)
+
+
+@pytest.mark.parametrize(
+    "domain",
+    [
+        Polygon([(0, 0), (2, 0), (2, 1), (1, 1), (1, 2), (0, 2)]),
+        Polygon([(0, 0), (1, 0), (0.3, 0.8)]),
+        Polygon([(0, 0), (1, 0.1), (1.2, 0.9), (0.5, 0.6), (-0.1, 1)]),
+        box(0, 0, 2, 2).difference(box(0.7, 0.8, 1.2, 1.3)),
+    ],
+    ids=["ell", "triangle", "pentagon", "with a hole"],
+)
+def test_map_agrees_with_an_independent_solver(domain):
+    oracle = Lightning(domain, poles=40, degree=40)
+    harmonic_map = HarmonicMap(domain, domain.representative_point())
+    bound = harmonic_map.accuracy.error_estimate + 3 * oracle.residual
+    assert bound < 1e-5
+    points = domains.inside(domain, 200, clearance=0.01)
+    T, _ = harmonic_map(points)
+    assert np.hypot(*(T - oracle(points)).T).max() <= bound
+
+
+def test_square_keeps_its_symmetry():
+    harmonic_map = HarmonicMap(box(-1, -1, 1, 1), Point(0, 0))
+    points = domains.inside(box(-1, -1, 1, 1), 100)
+    T, _ = harmonic_map(points)
+    quarter = np.array([[0.0, -1.0], [1.0, 0.0]])
+    np.testing.assert_allclose(harmonic_map(points @ quarter.T)[0], T @ quarter.T, atol=1e-9)
+    np.testing.assert_allclose(harmonic_map.goal_image, 0.0, atol=1e-9)
+
+
+def test_outer_ring_goes_to_the_circle_linearly_in_arc_length(mapped):
+    points, expected = boundary_samples(mapped.region)
+    T, J = mapped(points)
+    offset = np.arctan2(T[0, 1], T[0, 0]) - np.arctan2(expected[0, 1], expected[0, 0])
+    turn = np.array([[np.cos(offset), -np.sin(offset)], [np.sin(offset), np.cos(offset)]])
+    np.testing.assert_allclose(T, expected @ turn.T, atol=1e-6)
+    assert np.isfinite(J).all()
+
+
+def test_holes_collapse_to_interior_points():
+    domain, goal = NAMED["warehouse"]
+    harmonic_map = HarmonicMap(domain, goal)
+    for hole in domain.interiors:
+        T, _ = harmonic_map(
+            np.array([hole.interpolate(s).coords[0] for s in np.linspace(0, hole.length, 40)])
+        )
+        assert np.ptp(T, axis=0).max() < 1e-7
+        assert np.hypot(*T[0]) < 1.0
+
+
+def test_jacobian_is_the_derivative(mapped):
+    points = domains.inside(mapped.region, 300, clearance=0.01)
+    points = points[:60] if len(points) > 60 else points
+    h = 1e-4
+    differences = []
+    for axis in np.eye(2):
+        f = [mapped(points + k * h * axis)[0] for k in (-2, -1, 1, 2)]
+        differences.append((f[0] - 8 * f[1] + 8 * f[2] - f[3]) / (12 * h))
+    _, J = mapped(points)
+    np.testing.assert_allclose(J, np.stack(differences, axis=-1), atol=1e-6 * np.abs(J).max())
+
+
+@pytest.mark.parametrize(
+    ("name", "finest"), [("warehouse", 1e-10), ("two_rooms", 1e-9), ("rounded_room", 1e-10), ("maze", 1e-9)]
+)
+def test_jacobian_a_centimetre_from_walls_is_that_of_a_finer_map(name, finest):
+    domain, goal = NAMED[name]
+    points, _ = domains.off_wall(domain, 0.01)
+    points = points[shapely.contains_xy(domain.buffer(-0.0099), *points.T)][::7]
+    plain, finer = HarmonicMap(domain, goal), HarmonicMap(domain, goal, tolerance=finest)
+    assert finer.accuracy.unknowns > plain.accuracy.unknowns
+    h = 5e-4
+    differences = []
+    for axis in np.eye(2):
+        f = [finer(points + k * h * axis)[0] for k in (-3, -2, -1, 1, 2, 3)]
+        differences.append((-f[0] + 9 * f[1] - 45 * f[2] + 45 * f[3] - 9 * f[4] + f[5]) / (60 * h))
+    _, J = plain(points)
+    np.testing.assert_allclose(J, np.stack(differences, axis=-1), atol=1e-6 * np.abs(J).max())
+
+
+def test_polygon_of_many_sides_is_mapped_like_the_disk():
+    """On the inscribed polygon of n sides T differs from p / r by O(n^-2)."""
+    errors = []
+    for sides in (40, 80):
+        angle = 2 * np.pi * np.arange(sides) / sides
+        ring = 2.0 * np.column_stack((np.cos(angle), np.sin(angle)))
+        points = domains.inside(Polygon(ring), 200, clearance=0.2)
+        T, J = HarmonicMap(Polygon(ring), Point(0.3, 0.2))(points)
+        turn = (T[0] @ points[0] + 1j * (points[0, 0] * T[0, 1] - points[0, 1] * T[0, 0])) / (
+            points[0] @ points[0]
+        )
+        turn /= abs(turn)
+        z = (T[:, 0] + 1j * T[:, 1]) / turn
+        errors.append(np.abs(z - 0.5 * (points[:, 0] + 1j * points[:, 1])).max())
+        np.testing.assert_allclose(np.linalg.det(J), 0.25, atol=10 / sides**2)
+    assert errors[1] < 0.3 * errors[0] < 2e-3
+
+
+def test_polygons_of_many_sides_are_mapped_like_the_annulus():
+    """The hole of radius a in the disk of radius b goes to 0: T = r (rho - a^2 / rho) / (b^2 - a^2) b."""
+    errors = []
+    for sides in (24, 48):
+        angle = 2 * np.pi * np.arange(sides) / sides
+        circle = np.column_stack((np.cos(angle), np.sin(angle)))
+        domain = Polygon(2.0 * circle, [0.5 * circle])
+        points = domains.inside(domain, 300, clearance=0.1)
+        T, _ = HarmonicMap(domain, Point(1.2, 0.3))(points)
+        radius = np.hypot(*points.T)
+        expected = 2.0 * (radius - 0.25 / radius) / (4.0 - 0.25)
+        errors.append(np.abs(np.hypot(*T.T) - expected).max())
+    assert errors[1] < 0.3 * errors[0] < 1e-2
+
+
+def test_vertices_go_exactly_where_they_belong():
+    domain, goal = NAMED["warehouse"]
+    harmonic_map = HarmonicMap(domain, goal)
+    outer = np.asarray(shapely.orient_polygons(domain).exterior.coords)
+    s = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(outer, axis=0).T))))
+    T, _ = harmonic_map(outer)
+    turned = np.unwrap(np.arctan2(T[:, 1], T[:, 0]))
+    np.testing.assert_allclose(turned - turned[0], 2 * np.pi * s / s[-1], atol=1e-14)
+    for hole in domain.interiors:
+        T, J = harmonic_map(np.asarray(hole.coords))
+        assert np.ptp(T, axis=0).max() == 0.0
+        assert np.isfinite(J).all()
+
+
+def test_map_has_the_mean_value_property(mapped):
+    centres = domains.inside(mapped.region, 1000, clearance=0.05)
+    centres = centres[:20]
+    radius = 0.9 * shapely.distance(mapped.region.boundary, shapely.points(centres))
+    angle = 2 * np.pi * np.arange(256) / 256
+    circle = np.column_stack((np.cos(angle), np.sin(angle)))
+    T, _ = mapped(centres[:, None] + radius[:, None, None] * circle)
+    np.testing.assert_allclose(T.mean(axis=1), mapped(centres)[0], atol=1e-9)
+
+
+def test_walls_vertices_and_the_outside_have_defined_values(mapped):
+    ring = np.asarray(mapped.region.exterior.coords)
+    everywhere = np.concatenate((ring, 0.5 * (ring[1:] + ring[:-1]), ring + 1e-3, ring - 0.7, ring * 1e3))
+    T, J = mapped(everywhere)
+    assert np.isfinite(T).all()
+    assert np.isfinite(J).all()
+    np.testing.assert_allclose(np.hypot(*T[: len(ring)].T), 1.0, atol=1e-5)
+
+
+def test_walls_are_the_limit_from_inside(mapped):
+    walls, normals = domains.off_wall(mapped.region, 0.0)
+    step = 1e-7
+    T_wall, J_wall = mapped(walls)
+    T_off, _ = mapped(walls + step * normals)
+    predicted = T_wall + step * np.einsum("nij,nj->ni", J_wall, normals)
+    np.testing.assert_allclose(T_off, predicted, atol=1e-9 + 1e-3 * step * np.abs(J_wall).max())
+
+
+def test_shape_of_the_points_is_kept():
+    harmonic_map = HarmonicMap(*NAMED["square"])
+    T, J = harmonic_map([[[0.1, 0.2]], [[0.3, 0.4]]])
+    assert T.shape == (2, 1, 2)
+    assert J.shape == (2, 1, 2, 2)
+    assert harmonic_map([0.1, 0.2])[0] == pytest.approx(T[0, 0])
+
+
+def test_coordinates_far_from_the_origin_do_no_harm():
+    domain, goal = NAMED["u_corridor"]
+    points = domains.inside(domain, 50, clearance=1e-3)
+    far = HarmonicMap(affinity.translate(domain, 1e4, -2e4), affinity.translate(goal, 1e4, -2e4))
+    np.testing.assert_allclose(
+        far(points + np.array([1e4, -2e4]))[0], HarmonicMap(domain, goal)(points)[0], atol=1e-7
+    )
+
+
+def test_same_question_same_answer():
+    domain, goal = NAMED["warehouse"]
+    points = domains.inside(domain, 50)
+    first, second = HarmonicMap(domain, goal), HarmonicMap(domain, goal)
+    assert first(points)[0].tobytes() == second(points)[0].tobytes()
+    assert first(points)[1].tobytes() == second(points)[1].tobytes()
+
+
+ELL = Polygon([(0, 0), (2, 0), (2, 1), (1, 1), (1, 2), (0, 2)])
+
+
+@pytest.mark.parametrize(
+    ("domain", "goal"),
+    [
+        domains.square(),
+        domains.u_corridor(),
+        domains.warehouse(),
+        domains.needle(10),
+        domains.blade(350),
+        domains.two_rooms(0.01),
+        domains.two_rooms(0.1),
+        domains.bevelled(1e-3),
+        domains.bevelled(1e-6),
+        domains.rounded_room(),
+    ],
+    ids=lambda value: None,
+)
+def test_clean_and_nasty_domains_are_accurate(domain, goal):
+    accuracy = HarmonicMap(domain, goal).accuracy
+    holes = len(domain.interiors)
+    assert accuracy.residual <= 1e-6
+    assert accuracy.error_estimate == (2 * holes + 1) * accuracy.residual
+    assert accuracy.samples > accuracy.unknowns
+    assert 1.0 < accuracy.condition < 1e7
+
+
+def test_more_is_spent_where_more_is_asked():
+    plain, fine = HarmonicMap(ELL, Point(0.5, 0.5)), HarmonicMap(ELL, Point(0.5, 0.5), tolerance=2e-10)
+    assert fine.accuracy.unknowns > plain.accuracy.unknowns
+    assert fine.accuracy.error_estimate <= 2e-10 < plain.accuracy.error_estimate
+
+
+def test_refusal_names_the_corner_at_fault():
+    message = r"accurate to about .*; 1e-16 was asked for.*; at fault is the corner at \("
+    with pytest.raises(FieldError, match=message):
+        HarmonicMap(ELL, Point(0.5, 0.5), tolerance=1e-16)
+
+
+@pytest.mark.parametrize("gap", [1e-6, 1e-7])
+def test_a_gap_too_narrow_for_any_number_of_nodes_is_refused_at_the_first_attempt(monkeypatch, gap):
+    attempts = []
+    one_attempt = harmonic_map._attempt
+    monkeypatch.setattr(harmonic_map, "_attempt", lambda *a: attempts.append(a[-1]) or one_attempt(*a))
+    with pytest.raises(
+        UnmappableError, match=r"and rounding alone may cost .*; at fault is the gap of"
+    ) as caught:
+        HarmonicMap(*domains.two_rooms(gap))
+    assert len(attempts) == 1
+    assert caught.value.width == pytest.approx(gap, rel=0.01)
+    assert box(0.98, 0.49, 1.12, 0.51).contains(Point(caught.value.place))
+
+
+def test_a_narrow_gap_that_does_no_harm_is_mapped():
+    between_pillars = box(0, 0, 4, 3).difference(box(1, 1, 2, 2)).difference(box(2 + 1e-6, 1, 3, 2))
+    accuracy = HarmonicMap(between_pillars, Point(3.5, 0.5)).accuracy
+    assert accuracy.error_estimate <= 1e-8
+    assert accuracy.condition * np.finfo(float).eps > 1e-8
+
+
+def test_refusal_of_a_domain_too_fine_names_the_gap():
+    comb = box(0, 0, 4, 1)
+    for k in range(60):
+        comb = comb.difference(box(0.05 + 0.066 * k, 0.2, 0.07 + 0.066 * k, 2))
+    ragged = [(x, 0.0 if i % 2 else -1e-4) for i, x in enumerate(np.linspace(0, 4, 1200))]
+    with pytest.raises(FieldError, match=r"unknowns, at most \d+ are allowed; narrowest is the"):
+        HarmonicMap(comb.union(Polygon([*ragged, (4, 0.1), (0, 0.1)])), Point(2, 0.1))
+
+
+HALL = box(0, 0, 4, 2)
+WAREHOUSE, GOAL = domains.warehouse()
+SHELVES, SHELF_GOAL = domains.long_shelves(2)
+WITH_WALLS = {
+    "square": domains.square(),
+    "U corridor": domains.u_corridor(),
+    "warehouse": (WAREHOUSE, GOAL),
+    "maze": domains.maze(6),
+    "Minkowski, mitre": (WAREHOUSE.buffer(-0.15, join_style="mitre"), GOAL),
+    "Minkowski, round": (WAREHOUSE.buffer(-0.15, quad_segs=3), GOAL),
+    "goal on the outer ring": (WAREHOUSE, box(6.5, 4.8, 8, 6)),
+    "goal in the interior": (WAREHOUSE, box(7, 5.2, 7.8, 5.8)),
+    "long shelves": (SHELVES, SHELF_GOAL),
+    "holes 1 cm apart": (
+        HALL.difference(box(1, 0.5, 1.995, 1.5)).difference(box(2.005, 0.5, 3, 1.5)),
+        Point(3.5, 1),
+    ),
+    "needle": domains.needle(10),
+    "blade": domains.blade(350),
+}
+
+
+@pytest.fixture(scope="module", params=WITH_WALLS)
+def walled(request):
+    domain, goal = WITH_WALLS[request.param]
+    return HarmonicMap(domain, goal, tolerance=1e-6)
+
+
+def grid(region, count):
+    """Points of a square grid in a region, a little more than ``count``."""
+    x0, y0, x1, y1 = region.bounds
+    h = np.sqrt(region.area / (1.05 * count))
+    x, y = np.meshgrid(np.arange(x0 + 0.5 * h, x1, h), np.arange(y0 + 0.5 * h, y1, h))
+    points = np.column_stack((x.ravel(), y.ravel()))
+    return points[shapely.contains_xy(region, *points.T)]
+
+
+def test_disk_is_kept_and_nothing_is_folded(walled):
+    points = grid(walled.region, 20_000)
+    assert len(points) >= 20_000
+    close, _ = domains.off_wall(walled.region, 1e-3, 25)
+    close = close[shapely.contains_xy(walled.region, *close.T)]
+    everywhere = np.concatenate((points, close))
+    T, J = walled(everywhere)
+    assert (np.hypot(*T.T) < 1.0).all()
+    # The error of T is harmonic and bounded: its gradient is at most 4 / pi times bound over distance.
+    distance = BoundaryDistance(walled.region).batch(everywhere)
+    J_error = np.sqrt(2.0) * 4.0 / np.pi * walled.accuracy.error_estimate / distance
+    det_error = 2.0 * np.linalg.norm(J, 2, axis=(1, 2)) * J_error + J_error**2
+    det = np.linalg.det(J)
+    assert (det > -det_error).all()
+    certain = np.abs(det) > det_error
+    assert (det[certain] > 0.0).all()
+    assert np.mean(certain) > 0.6
+
+
+def test_walls_and_vertices_have_values(walled):
+    rings = [walled.region.exterior, *walled.region.interiors]
+    vertices = np.concatenate([shapely.get_coordinates(ring) for ring in rings])
+    walls, _ = domains.off_wall(walled.region, 0.0, 11)
+    hair = 1e-13 * np.array([[1.0, 0.0], [0.0, 1.0], [-1.0, 0.0], [0.0, -1.0]])
+    for points in (vertices, walls, (vertices[:, None] + hair).reshape(-1, 2)):
+        T, J = walled(points)
+        assert np.isfinite(T).all()
+        assert np.isfinite(J).all()
+        assert (np.hypot(*T.T) <= 1.0 + 1.5 * walled.accuracy.error_estimate).all()
+
+
+WAREHOUSE, GOAL = domains.warehouse()
+AGAINST_SINGLE_LAYER = {
+    "square": (*domains.square(), 40),
+    "U corridor": (*domains.u_corridor(), 40),
+    "warehouse": (WAREHOUSE, GOAL, 40),
+    "maze": (*domains.maze(5), 80),
+    "Minkowski, mitre": (WAREHOUSE.buffer(-0.15, join_style="mitre"), GOAL, 40),
+    "Minkowski, round": (WAREHOUSE.buffer(-0.15, quad_segs=3), GOAL, 20),
+    "goal on the outer ring": (WAREHOUSE, box(6.5, 4.8, 8, 6), 40),
+}
+ACCURACY = 4e-4  # of the oracle, whose elements are constant
+
+
+@pytest.mark.parametrize("name", AGAINST_SINGLE_LAYER)
+def test_map_and_jacobian_agree_with_a_single_layer(name):
+    domain, goal, elements = AGAINST_SINGLE_LAYER[name]
+    harmonic_map = HarmonicMap(domain, goal, tolerance=1e-6)
+    region = harmonic_map.region
+    collapsed = goal if isinstance(goal, Polygon) else None
+    oracle = SingleLayer(region, elements=elements, collapsed=collapsed)
+    points = domains.inside(region, 600, clearance=0.02)
+    T, _ = harmonic_map(points)
+    assert np.hypot(*(T - oracle(points)).T).max() < ACCURACY
+    # A harmonic error of that size changes by its size within the distance to the wall.
+    deep = domains.inside(region, 600, clearance=0.1)
+    slack = 4.0 / np.pi * np.sqrt(2.0) * ACCURACY / 0.1
+    assert np.linalg.norm(harmonic_map(deep)[1] - oracle.jacobian(deep), axis=(1, 2)).max() < slack
+
+
+def test_the_oracle_converges_to_the_map():
+    domain, goal = domains.u_corridor()
+    points = domains.inside(domain, 300, clearance=0.1)
+    T, _ = HarmonicMap(domain, goal, tolerance=1e-8)(points)
+    errors = [np.abs(SingleLayer(domain, elements=n)(points) - T).max() for n in (10, 30, 90)]
+    assert errors[1] < errors[0] / 3.0
+    assert errors[2] < errors[1] / 3.0
+
+
+@pytest.mark.parametrize("question", REAL_CELLS.values(), ids=REAL_CELLS)
+def test_a_real_cell_is_mapped_to_1e_8(question):
+    mapped = HarmonicMap(*question, tolerance=1e-8)
+    assert mapped.accuracy.error_estimate <= 1e-8
+    assert sample_boundary(mapped, 301).residual.max() <= 1.5e-8
+    assert np.linalg.det(mapped(inside(mapped.region, 2_000))[1]).min() > 0.0
