@@ -152,7 +152,7 @@ class HarmonicMap:
     ) -> None:
         self.goal = goal
         self.region, self.target = region_to_map(domain, goal, inside)
-        self.solution = solution or solve(outline_of(self.region, self.target), self.target, tolerance)
+        self.solution = solution or _solve(outline_of(self.region, self.target), self.target, tolerance)
 
     def __call__(self, points: ArrayLike) -> tuple[FloatArray, FloatArray]:
         """T and its Jacobian.

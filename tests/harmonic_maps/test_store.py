@@ -56,7 +56,7 @@ def test_a_map_that_was_kept_is_the_one_that_was_solved(store, question):
 
 def test_what_is_found_is_not_solved_again(store, monkeypatch):
     store.map_of(*domains.square(), tolerance=TOLERANCE)
-    monkeypatch.setattr("coop_drake.harmonic_maps.harmonic_map.solve", None)
+    monkeypatch.setattr("coop_drake.harmonic_maps.harmonic_map._solve", None)
     store.map_of(*domains.square(), tolerance=TOLERANCE)
     assert store.found == 1
 
