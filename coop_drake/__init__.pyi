@@ -16,8 +16,8 @@ from .chain import plan, show, verify, verify_run, why
 from .diagnosis import Diagnosis, diagnosis_figure, rows_of, sentences_of
 from .diagram import ClosedLoop, build_closed_loop
 from .errors import CoopDrakeError
-from .harmonic_maps import HarmonicMap, MapStore, VelocityField
 from .floor_plans import FloorPlanSettings, read_floor_plan
+from .harmonic_maps import HarmonicMap, MapStore, VelocityField
 from .laws import FixedGains, GainSet, ScheduledGains
 from .plant import planning_problem
 from .scenario import Scenario, dump_scenario, load_scenario
