@@ -20,6 +20,7 @@ def call(*arguments, **more):
     return CliRunner().invoke(app, ["new", *map(str, arguments)], **more)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "flags",
     [

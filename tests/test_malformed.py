@@ -183,6 +183,7 @@ def bench(tmp_path) -> Iterator[Bench]:
     return Bench(tmp_path)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("group", SCENARIOS)
 def test_malformed_scenarios_are_refused(group, bench):
     load_scenario(MODELS / "base.scenario.yaml")
@@ -257,6 +258,7 @@ def proof_mutants(index: int, folder: Path) -> list[Mutant]:
     ]
 
 
+@pytest.mark.slow
 @pytest.mark.no_cover
 @pytest.mark.parametrize("index", range(len(CORRIDORS)))
 def test_malformed_proofs_are_refused(index, bench, monkeypatch):

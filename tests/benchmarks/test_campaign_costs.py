@@ -14,6 +14,7 @@ def test_a_worker_has_a_size_after_every_batch():
     assert all(size > 10.0 for size in sizes)
 
 
+@pytest.mark.slow
 def test_empty_batches_cost_something():
     rows = placing(5)
     assert [row.name for row in rows] == [

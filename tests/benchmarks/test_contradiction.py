@@ -6,7 +6,7 @@ import pytest
 from benchmarks.isolated import Isolated
 from benchmarks.planner import contradiction
 from benchmarks.planner.contradiction import Patience, contradiction_rows
-from benchmarks.planner.family import corridor_problem, first_question
+from benchmarks.planner.family import first_question
 from benchmarks.planner.ours import Planned, plan_repeatedly
 from benchmarks.questions.peer import PeerRun
 
@@ -19,6 +19,7 @@ def figures(rows):
     return {row.figure: (row.value, row.unit) for row in rows}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("answer", "contradictions"), [("infeasible", 1), ("undecided", 0)])
 def test_only_paths_that_hold_contradict_and_only_a_no(monkeypatch, answer, contradictions):
     ours = Planned(answer, 1.0, 1.0, 1, 1, 0.0, 0.0)
@@ -34,12 +35,3 @@ def test_only_paths_that_hold_contradict_and_only_a_no(monkeypatch, answer, cont
     assert rows["contradictions"] == (contradictions, "paths in 2 runs, 5 CPU s")
     assert rows["paths_found"] == (1, "paths")
     assert rows["checks"] == (30, "checks")
-
-
-def test_nobody_contradicts_that_a_corridor_is_too_narrow(monkeypatch):
-    monkeypatch.setattr(contradiction, "has_ompl", lambda: False)
-    spent = Patience(runs=1, checks=1_000)
-    rows = figures(contradiction_rows("planner/no_way/closed", corridor_problem(0.77), spent))
-    assert rows["answer"] == (1.0, "infeasible")
-    assert rows["contradictions"][0] == 0
-    assert rows["checks"][0] >= 1_000

@@ -22,6 +22,7 @@ def test_the_peak_is_that_of_the_work_not_of_whoever_asked():
     assert small.peak_mb < 1e-6 * held.nbytes
 
 
+@pytest.mark.slow
 def test_work_that_takes_too_long_is_stopped():
     done = in_own_process(_busy, limit=1)
     assert done.value is None

@@ -8,6 +8,7 @@ from tests.support.sampled_team import sampled
 from tests.support.small_loop import small_maps
 
 
+@pytest.mark.slow
 @pytest.mark.no_cover
 def test_a_team_whose_others_brake_moves_less_than_one_that_follows_the_plan(monkeypatch):
     monkeypatch.setattr(benchmarks.limp, "_AFTER", 0.4)

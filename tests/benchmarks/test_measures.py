@@ -8,6 +8,8 @@ from benchmarks.planner.family import first_question
 from benchmarks.planner.ours import plan_repeatedly
 from benchmarks.planner.stages import STAGES, stage_rows, without_stage
 
+pytestmark = pytest.mark.slow
+
 EASY = first_question()
 
 

@@ -28,6 +28,8 @@ from coop_drake.errors import ProcessError
 from tests.support.processes import kill, processes, waited_for
 from tests.support.scenarios import write_scenario
 
+pytestmark = pytest.mark.slow
+
 RUNS, BATCH = 12, 2
 FILE = f"""
 runs:
@@ -126,7 +128,6 @@ def ended(command, folder, number):
     waited_for(lambda: not processes(str(folder.path)))
 
 
-@pytest.mark.slow
 def test_a_campaign_that_is_disturbed_in_every_way_ends_as_one_that_is_not(undisturbed, begun):
     folder = CampaignFolder(undisturbed.folder.path.with_name("disturbed"))
     undisturbed.order(folder.path)  # The plans are there: they would not fit where a disk is full.
@@ -178,7 +179,6 @@ def test_a_campaign_that_is_disturbed_in_every_way_ends_as_one_that_is_not(undis
     assert sorted_bytes(folder, undisturbed) == sorted_bytes(undisturbed.folder, undisturbed)
 
 
-@pytest.mark.slow
 def test_a_scheduler_of_the_users_own_may_be_killed(undisturbed, begun, tmp_path):
     folder = CampaignFolder(undisturbed.folder.path.with_name("elsewhere"))
     place = tmp_path / "scheduler.json"
@@ -205,7 +205,6 @@ def test_a_scheduler_of_the_users_own_may_be_killed(undisturbed, begun, tmp_path
     assert undisturbed.missing(folder)
 
 
-@pytest.mark.slow
 def test_a_process_that_hangs_is_ended_and_another_goes_on(undisturbed, tmp_path, monkeypatch):
     timely, limits = supervising._timely, iter([2.0])
     monkeypatch.setattr(supervising, "_START", 0.0)
@@ -235,7 +234,6 @@ def test_a_process_removes_its_files_when_what_started_it_has_ended(undisturbed,
     assert not scratch.exists()
 
 
-@pytest.mark.slow
 def test_a_run_that_ends_every_process_is_recorded_as_lost_and_the_others_are_made(
     undisturbed, tmp_path, monkeypatch
 ):
@@ -271,7 +269,6 @@ def test_a_scenario_that_was_changed_meanwhile_is_not_run(undisturbed, tmp_path)
         make_batch(order)
 
 
-@pytest.mark.slow
 def test_a_log_that_cannot_be_written_ends_the_command_and_loses_no_run(undisturbed, tmp_path):
     order = undisturbed.order(tmp_path / "kept")
     folder = CampaignFolder(tmp_path / "kept")

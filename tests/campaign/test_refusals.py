@@ -45,6 +45,7 @@ def refused(folder, command="run", *arguments, **sections):
     return result.stderr
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("section", "said"),
     [

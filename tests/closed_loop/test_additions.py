@@ -14,6 +14,8 @@ from tests.support.small_loop import joint_names, small_maps
 from tests.support.small_plan import small_plan
 from tests.support.small_scenario import small_scenario
 
+pytestmark = pytest.mark.slow
+
 NONE, PREDICTOR, OBSERVER = Control(), Control(predictor=True), Control(observer=True)
 LATE = Measurements(delay=0.04)
 

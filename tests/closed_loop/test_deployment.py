@@ -7,7 +7,8 @@ import pytest
 from pydrake.systems.analysis import ExtractSimulatorConfig, Simulator
 from pydrake.systems.primitives import ConstantVectorSource
 
-from coop_drake.compiled_loop import simulate_fused
+from coop_drake.compiled_loop import prepare
+from coop_drake.compiled_loop import run as compiled_run
 from coop_drake.laws import FixedGains, ScheduledGains
 from coop_drake.scenario import (
     ActuatorLimits,
@@ -78,6 +79,9 @@ MILD = {
     "push": pushed(20.0),
     "start": at_200_hz(start_offset=StartOffset(0.005, -0.005, 0.005, (0.005, -0.005))),
 }
+QUICK = {"sampling", "noise", "delay", "model error", "push"}
+"""Departures that are no slow tests."""
+
 HARSH = {
     "sampling": (Deployment(control_rate=15.0), "to its funnel is"),
     "start": (Deployment(start_offset=StartOffset(theta=0.3)), "distance of object angle to its funnel is -"),
@@ -155,7 +159,9 @@ def run_anew(deployment, gain_set=None, max_time=6.0):
 
 
 @pytest.mark.no_cover
-@pytest.mark.parametrize("name", MILD)
+@pytest.mark.parametrize(
+    "name", [name if name in QUICK else pytest.param(name, marks=pytest.mark.slow) for name in MILD]
+)
 def test_a_mild_departure_is_survived(name):
     log = run(MILD[name])
     assert log.violation == ""
@@ -168,14 +174,12 @@ def test_a_mild_departure_is_survived(name):
     assert verified_run(*deployed(MILD[name]), log).answer == "arrived"
 
 
-@pytest.mark.slow
 def test_a_thousand_samples_a_second_are_survived_too():
     scenario, plan = small_problem("base")
     fast = replace(scenario, deployment=Deployment(control_rate=1000.0))
-    log = simulate_fused(fast, plan, small_maps())
-    assert log.reached
-    assert log.violation == ""
-    assert min(log.funnel_margin.min(), log.slice_margin.min(), log.cell_clearance.min()) > 0.0
+    outcome = compiled_run(prepare(fast, plan, small_maps()))
+    assert outcome.arrived, outcome.reason
+    assert min(outcome.funnel_margin, outcome.cell_margin) > 0.0
 
 
 @pytest.mark.parametrize(("seed", "mass_error"), [(0, 0.2), (1, -0.2), (2, 0.2)])
@@ -186,6 +190,7 @@ def test_a_team_as_the_preset_describes_it_arrives(seed, mass_error):
     assert log.reached
 
 
+@pytest.mark.slow
 @pytest.mark.no_cover
 @pytest.mark.parametrize("name", HARSH)
 def test_a_harsh_one_is_reported_as_what_it_is(name):

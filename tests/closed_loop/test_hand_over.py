@@ -29,6 +29,7 @@ def test_no_switch_breaks_anything_and_none_is_waited_for_in_vain(seed, tmp_path
     assert_certified(plan, log)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("gain_set", "steps"), [(None, False), (FixedGains(), True)])
 @pytest.mark.parametrize("run", [simulate, simulate_fused], ids=["named", "fused"])
 def test_forces_go_on_where_they_were_unless_gains_step_as_printed(gain_set, steps, run):

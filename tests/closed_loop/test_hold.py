@@ -96,6 +96,7 @@ def test_at_random_moments_the_team_rests_without_contact_in_time(base):
     assert len(cells) > 20
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("number", [9, 45, 83])
 def test_it_arrives_when_it_is_released(base, number):
     scenario, loop, invariants, contexts = base
@@ -109,6 +110,7 @@ def held_scenario(hold, deployment=None):
     return replace(scenario, control=Control(hold=hold), deployment=deployment or Deployment()), plan
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("run", [simulate, simulate_fused], ids=["named", "fused"])
 def test_a_scheduled_hold_costs_its_time_and_no_more(run):
     scenario, plan = held_scenario(Hold(at=(0.2, 0.9), duration=1.5))
@@ -122,6 +124,7 @@ def test_a_scheduled_hold_costs_its_time_and_no_more(run):
     assert verified_run(scenario, plan, log).answer == "arrived"
 
 
+@pytest.mark.slow
 def test_a_silent_robot_holds_the_team_until_it_is_heard_again():
     silent = RobotDepartures(silence=Silence(begin=0.5, duration=2.0))
     deployment = Deployment(control_rate=200.0, robots={"robot_1": silent})
@@ -136,6 +139,7 @@ def test_a_silent_robot_holds_the_team_until_it_is_heard_again():
     assert verified_run(scenario, plan, log).answer == "arrived"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(4))
 def test_a_robot_that_misses_the_order_holds_by_itself_and_the_team_arrives(seed):
     """At a random moment one robot hears nothing any more; shortly afterwards the team is told to hold."""

@@ -21,6 +21,8 @@ from coop_drake.scenario import (
 from coop_drake.simulation import build_maps, simulate
 from tests.support.tubes import WITH_AXES, tubed_problem
 
+pytestmark = pytest.mark.slow
+
 PRESET = Deployment(
     control_rate=200.0,
     mass_error=0.2,
@@ -80,7 +82,6 @@ def test_what_goes_on_never_ends_in_an_arrival(departing):
     assert abs(fused.times[-1] - outcome.time) < 0.006
 
 
-@pytest.mark.slow
 def test_robots_in_nodes_of_their_own_let_the_drives_brake():
     log = simulated(BLOCKED, simulate_apart)
     assert not log.reached

@@ -49,6 +49,7 @@ def assert_exact_arrival(log):
     assert log.energy_margin.min() >= 0.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("arm", "start"),
     [(SLIDING, "[0.0, 0.0]"), (UPSIDE_DOWN, "[0.0, 0.0]"), (DAMPED, "[0.0]"), (Arm(joints=()), "[]")],

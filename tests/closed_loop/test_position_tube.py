@@ -39,6 +39,7 @@ def noisy_run():
     return scenario, plan, simulate(scenario, plan, maps)
 
 
+@pytest.mark.slow
 def test_a_noisy_late_and_wrong_team_stays_in_the_tube():
     scenario, plan, log = noisy_run()
     assert (log.reached, log.violation) == (True, "")
@@ -51,6 +52,7 @@ def test_a_noisy_late_and_wrong_team_stays_in_the_tube():
     assert rest < scenario.goal.tolerances.position
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mass_error", [-0.2, 0.2])
 def test_fused_and_named_blocks_lead_alike(mass_error):
     scenario, plan, maps = problem(FUSED)

@@ -62,6 +62,7 @@ def spared(plan, log):
     return (kept - stated).min(axis=0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mass_error", [-0.2, 0.2])
 def test_axes_keep_the_stated_distances_in_a_quick_turn(mass_error):
     plan, log = turned(mass_error)

@@ -31,6 +31,7 @@ def logs():
     )
 
 
+@pytest.mark.slow
 def test_the_log_is_verified_up_to_what_grasps_yield(logs):
     plan, _, log = logs
     scenario = replace(small_problem("base")[0], plant=SEPARATE)

@@ -55,6 +55,7 @@ def speeds(log):
     return np.hypot(moved[..., 0], moved[..., 1]), np.abs(turned) / steps[steps > 1e-4][:, None]
 
 
+@pytest.mark.slow
 def test_the_transport_arrives_and_keeps_every_limit(case):
     scenario, plan, log = case
     assert log.reached, log.violation
@@ -98,6 +99,7 @@ def test_named_blocks_keep_the_same_limits(case):
     np.testing.assert_allclose(named.joint_rates[-1], log.joint_rates[-1], atol=1e-8)
 
 
+@pytest.mark.slow
 def test_altered_numbers_are_refused(case, tmp_path):
     scenario, plan, _ = case
     problem = planning_problem(scenario)

@@ -10,6 +10,8 @@ from tests.support.ring_team import PRISMATIC, REVOLUTE, ring_team
 from tests.support.small_loop import joint_names
 from tests.support.small_plan import round_trip
 
+pytestmark = pytest.mark.slow
+
 ONE, TWO, THREE = (REVOLUTE,), (REVOLUTE, REVOLUTE), (REVOLUTE, REVOLUTE, REVOLUTE)
 SLIDE, MIXED = (PRISMATIC,), (PRISMATIC, REVOLUTE)
 TEAMS = {
@@ -35,7 +37,6 @@ def run(request, tmp_path_factory, maps):
     return scenario, log
 
 
-@pytest.mark.slow
 def test_it_arrives_and_every_equation_holds_on_the_way(run):
     scenario, log = run
     assert log.violation == ""

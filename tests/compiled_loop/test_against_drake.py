@@ -105,6 +105,7 @@ def assert_agree(outcome, log, *, close=1e-5):
     assert outcome.peak_torque == pytest.approx(np.abs(log.joint_torques).max(), rel=2e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", CASES)
 def test_each_departure_has_the_same_effect(name):
     outcome, log = both(prepared(), CASES[name], small_maps())
@@ -140,6 +141,7 @@ def test_other_gains_change_the_cells_alone():
     assert repr(run(found)) == repr(run(expected)) != repr(run(transport))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("team", ["base", "elbow"])
 def test_a_plan_with_a_budget_is_followed_as_in_drake(team):
     scenario, plan = tubed_problem(WITH_AXES, team)
@@ -151,6 +153,7 @@ def test_a_plan_with_a_budget_is_followed_as_in_drake(team):
     assert np.isnan(run(prepared()).budget_share)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("size", "accepted"), [(1.0, True), (1.1, False)])
 def test_a_start_within_the_errors_of_the_budget_is_accepted_and_no_other(size, accepted):
     scenario, plan = tubed_problem(WITH_AXES, "base")

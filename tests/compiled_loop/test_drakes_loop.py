@@ -85,6 +85,7 @@ def assert_same(found, expected):
             )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("deployment", [EVERYTHING, NO_DELAY], ids=["everything", "no delay"])
 def test_all_departures_have_the_same_effect_in_every_row(deployment):
     scenario, plan = small_problem("base")
@@ -92,6 +93,7 @@ def test_all_departures_have_the_same_effect_in_every_row(deployment):
     assert_same(*both(replace(scenario, deployment=deployment, simulator=brief), plan, small_maps()))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("team", ["base", "elbow"])
 def test_a_run_with_a_budget_is_the_same_from_start_to_goal(team):
     scenario, plan = tubed_problem(WITH_AXES, team)

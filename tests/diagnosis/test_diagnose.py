@@ -103,6 +103,7 @@ def test_a_smaller_object_is_bracketed_and_holds_when_planned_again(rod):
     assert not isinstance(answer, Channel)
 
 
+@pytest.mark.slow
 def test_a_joint_range_at_fault_is_found_out(monkeypatch):
     monkeypatch.setattr(relaxations, "changes", lambda tree: changes(tree)[-1:])  # The others are as slow.
     problem = two_rooms(0.3, bent_tree(), (1.1,))
@@ -133,6 +134,7 @@ def test_a_feasible_question_is_said_to_be_so():
     assert diagnosis_figure(two_rooms(0.6, rod_tree()), diagnosis) is None
 
 
+@pytest.mark.slow
 def test_two_passages_in_a_row_are_both_named_each_with_what_it_misses():
     floor = [box(-4, -1.2, -1, 1.2), box(-1.1, -0.075, 1.1, 0.075), box(1, -1.2, 4, 1.2)]
     floor += [box(3.9, 0.91, 6.1, 1.09), box(6, -1.2, 9, 1.2)]
@@ -161,6 +163,7 @@ def test_a_team_in_its_own_way_is_told_which_bodies():
     assert bare.pairs == (("block", "arm"),)
 
 
+@pytest.mark.slow
 def test_a_blocked_goal_names_the_body_the_wall_and_the_depth():
     problem = replace(case("base"), goal_pose=np.array([6.2, 4.5, 0.0]))
     diagnosis = diagnose(problem)
@@ -187,6 +190,7 @@ def test_an_undecided_question_says_what_remained_mixed(monkeypatch):
     assert facts_of(diagnosis)["mixed"][0]["share_of_axis"] == diagnosis.mixed[0].width_fraction
 
 
+@pytest.mark.slow
 @pytest.mark.no_cover
 def test_the_same_question_has_the_same_diagnosis_and_picture(rod, tmp_path):
     problem, first = rod

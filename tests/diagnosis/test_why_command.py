@@ -22,6 +22,7 @@ def blocked(tmp_path):
     return write_scenario(tmp_path / "blocked.scenario.yaml", goal=goal)
 
 
+@pytest.mark.slow
 def test_a_blocked_goal_gets_its_sentences_its_pictures_and_exit_code_3(blocked, tmp_path):
     out = tmp_path / "out"
     result = invoke("why", blocked, "--out", out, "--json")
@@ -36,6 +37,7 @@ def test_a_blocked_goal_gets_its_sentences_its_pictures_and_exit_code_3(blocked,
     assert (out / "why.svg").read_text().lstrip().startswith("<?xml")
 
 
+@pytest.mark.slow
 def test_a_feasible_scenario_is_said_to_be_so_and_an_older_picture_goes(tmp_path):
     path, out = write_scenario(tmp_path / "room.scenario.yaml"), tmp_path / "out"
     ResultFolder(out).begin("diagnosis")

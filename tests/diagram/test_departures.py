@@ -100,6 +100,7 @@ def test_a_robot_that_samples_later_changes_its_effort_later():
     assert same == [[False, True], [True, False]]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("motors", ["working", "held", "limp"])
 def test_a_silent_robot_sends_its_last_report_and_its_motors_do_as_stated(motors):
     loop = loop_of(**in_first(silence=Silence(0.3, 0.1, motors)))

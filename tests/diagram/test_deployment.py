@@ -29,6 +29,7 @@ def test_an_ideal_team_has_nothing_round_its_controllers():
     assert loop.bare_controllers == loop.controllers
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("deployment", "more"),
     [

@@ -128,6 +128,7 @@ def test_leaves_share_out_the_square(mapped):
     assert sorted(-1 - arrays.boxes[arrays.boxes < 0]) == list(range(len(area)))
 
 
+@pytest.mark.slow
 def test_sharp_corners_of_many_nodes_fit():
     domain, goal = domains.needle(1.05)
     harmonic_map = HarmonicMap(domain, goal)

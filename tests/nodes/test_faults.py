@@ -15,7 +15,7 @@ from tests.support.same_runs import differences
 from tests.support.sampled_team import sampled
 from tests.support.small_loop import small_maps
 
-pytestmark = pytest.mark.no_cover
+pytestmark = [pytest.mark.no_cover, pytest.mark.slow]
 
 PATIENT = {"patience": 1.0, "rejoin": 0.0}
 
@@ -48,7 +48,6 @@ def stop(index):
     return lambda team: os.kill(team.processes[index].pid, signal.SIGSTOP)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("team", "act", "name"),
     [
@@ -92,7 +91,6 @@ def test_a_process_that_is_missing_at_the_start_is_named():
     assert not any(process.is_alive() for process in team.processes.values())
 
 
-@pytest.mark.slow
 def test_the_pace_of_the_wall_clock_changes_nothing_where_nobody_is_late():
     facts = {}
     log = run_with("base", lambda team: None, pacing=Pacing(allowed=30.0), report=facts.update)
@@ -107,7 +105,6 @@ def test_the_pace_of_the_wall_clock_changes_nothing_where_nobody_is_late():
     assert facts["refused"] == {}
 
 
-@pytest.mark.slow
 def test_a_robot_that_is_late_for_too_long_stops_a_paced_team():
     facts = {}
     log = run_with("base", stop(1), pacing=Pacing(allowed=1.0), report=facts.update)

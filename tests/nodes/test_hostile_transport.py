@@ -54,6 +54,7 @@ class Hostile:
         self._context.term()
 
 
+@pytest.mark.slow
 def test_the_log_is_that_of_an_undisturbed_run():
     scenario, plan = sampled("base")
     undisturbed, book = simulate(scenario, plan, small_maps()), local_book(2)

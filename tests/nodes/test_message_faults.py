@@ -11,7 +11,7 @@ from tests.support.same_runs import differences
 from tests.support.sampled_team import sampled
 from tests.support.small_loop import small_maps
 
-pytestmark = pytest.mark.no_cover
+pytestmark = [pytest.mark.no_cover, pytest.mark.slow]
 
 AWAY = Gap(0.4, 0.3)
 BAD = ChannelFaults(loss=0.2, repeat=0.2, late=0.2, late_by=0.03)
@@ -56,7 +56,6 @@ def run(case):
 kept = cache(run)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("case", CASES)
 def test_a_team_goes_on_or_waits_at_rest_and_arrives_without_contact(case):
     log, facts = kept(case)

@@ -24,6 +24,7 @@ SIZE = 148
 """Bytes on the team's channel in the transport of the test, with headers and the opening of sessions."""
 
 
+@pytest.mark.slow
 def test_a_held_team_of_three_with_noise_delay_and_losses_runs_as_in_one_process():
     scenario, plan = sampled(
         "three",

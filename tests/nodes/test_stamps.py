@@ -90,6 +90,7 @@ class LateExchange(DirectExchange):
         return super().step(time, *self.past[max(0, len(self.past) - 1 - late)])
 
 
+@pytest.mark.slow
 def test_a_team_whose_measurements_come_later_than_its_plan_allows_rests_and_says_why(transport):  # noqa: F811
     scenario, plan, maps, _ = transport
     exchange = LateExchange(0.8, 3)

@@ -14,6 +14,8 @@ from paper.table_1 import (
 from tests.support.axes_run import play
 from tests.support.table_1 import table_transitions
 
+pytestmark = pytest.mark.slow
+
 JOINT_RANGE = 3.74
 OVERLAPS = np.array([0.1, 0.15, 0.2])
 
@@ -52,7 +54,6 @@ def runs():
     return {type(gains).__name__: play(transitions, gains, start=START, step=2e-3) for gains in sets}
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("gain_set", ["FixedGains", "ScheduledGains"])
 def test_every_cell_is_passed_inside_its_funnels(runs, gain_set):
     run = runs[gain_set]
@@ -68,7 +69,6 @@ def test_scheduled_gains_are_gentler(runs):
     assert np.all(fixed > 2.0 * scheduled)
 
 
-@pytest.mark.slow
 def test_the_energy_gate_tames_the_gains_of_table_2(runs):
     """Without the gate the next funnel begins while the last one still rings."""
     rushed = play(table_transitions(CORRECTED), FixedGains(), start=START, gated=False)

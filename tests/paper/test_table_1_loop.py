@@ -10,6 +10,8 @@ from coop_drake.scenario import load_scenario
 from paper import CORRECTED, compare_gains, corridor_plan, corridor_scenario
 from tests.support.scenarios import MODELS
 
+pytestmark = pytest.mark.slow
+
 
 def shipped(name):
     return load_scenario(MODELS / f"{name}.scenario.yaml")
@@ -28,7 +30,6 @@ def test_the_plan_has_the_table_s_intervals_and_walks_through_the_hall():
     assert [transition.only_angles for transition in plan.transitions] == [False] * 29 + [True]
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("name", ["table_2", "scheduled"])
 def test_every_equation_holds_on_every_step_of_thirty_cells(figures, name):
     gains = figures[name]

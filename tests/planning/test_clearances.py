@@ -34,6 +34,7 @@ def test_a_configuration_is_as_far_from_the_walls_as_its_footprint(data: st.Data
             assert found <= ROUNDING
 
 
+@pytest.mark.slow
 @SLOW
 @given(st.data())
 def test_a_box_has_the_clearance_of_its_cell(data: st.DataObject) -> None:

@@ -136,6 +136,7 @@ def test_any_turn_of_the_goal_will_do(goal: tuple[float, float, float]) -> None:
     assert_found(question(box(0, 0, 4, 3), goal=goal))
 
 
+@pytest.mark.slow
 @pytest.mark.no_cover
 @pytest.mark.parametrize("aside", [0.0, 1e-9, -1e-9, -0.01])
 @pytest.mark.parametrize("end", ["start", "goal"])

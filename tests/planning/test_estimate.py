@@ -38,6 +38,7 @@ def test_speed_in_a_long_aisle_is_that_of_a_governed_point(gain_set):
     assert run.velocity[-1, 0] == pytest.approx(speed_per_clearance(gains) * half_width, rel=1e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("gain_set", [FixedGains(), ScheduledGains()])
 def test_the_estimate_is_that_of_a_transport_through_maps(gain_set):
     plan = make_plan(*bent_channel(cells=4), gain_set, gain_set_name="any")

@@ -128,6 +128,7 @@ def test_no_exploration_errs_however_often_regions_cannot_be_cut_or_parted(
     assert outcome.verdict is not (Verdict.FOUND if corridor < 0.2 else Verdict.INFEASIBLE)
 
 
+@pytest.mark.slow
 @pytest.mark.no_cover
 @pytest.mark.parametrize(("name", "failure"), BROKEN)
 def test_a_search_that_cannot_cut_or_part_regions_never_errs(monkeypatch, name: str, failure) -> None:

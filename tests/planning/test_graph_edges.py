@@ -56,6 +56,7 @@ def test_nodes_are_joined_where_their_bounds_meet(linked):
     assert len(expected) > BLOCK * NODES / 2
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(5))
 def test_what_tests_and_removals_leave_is_what_a_dictionary_would_hold(linked, seed):
     random, expected = np.random.default_rng(seed), edges_of(linked)

@@ -61,6 +61,7 @@ def test_a_run_asks_for_no_more_than_its_plan_states(limited):
     assert forces.max() > 0.1 * stated[:, :2].max()
 
 
+@pytest.mark.slow
 def test_the_verifier_accepts_what_is_stated_and_refuses_less_and_smaller_limits(limited):
     asked, made = limited
     tree = asked.problem.tree

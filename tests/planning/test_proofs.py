@@ -41,6 +41,7 @@ def test_an_ended_proof_covers_every_angle(robots: tuple[int, ...]) -> None:
     assert covered(question, lower, upper)
 
 
+@pytest.mark.slow
 def test_the_whole_of_a_team_is_refuted_along_the_few_axes_that_matter() -> None:
     """Six dimensions, no relaxation: theta and the joint of the robot that is in the way come first."""
     exploration = Exploration(transport(0.95, robots=3))
@@ -77,6 +78,7 @@ def test_a_relaxation_refutes_the_whole() -> None:
     assert proofs.slices < 600
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["base", "tight", "three", "elbow"])
 def test_nothing_is_refuted_that_is_feasible(name: str) -> None:
     proofs = Proofs(case(name))

@@ -129,6 +129,7 @@ def test_the_margin_grows_and_shrinks_with_the_scene(kind, scale: float) -> None
         assert 0.5 * found.margin < channel.margin / scale < 2.0 * found.margin
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scale", [1e-3, 1000.0])
 def test_a_transport_is_planned_and_verified_in_any_unit(scale: float) -> None:
     """Gains have bounds in metres: the largest and the smallest teams move slowly, and their plans say so."""

@@ -53,6 +53,7 @@ def test_walls_that_squeeze_two_bases_together_close_a_corridor_with_few_slices(
             assert not FreePositions(question.tree, question.workspace, angles).free(positions).any()
 
 
+@pytest.mark.slow
 def test_a_proof_with_squeezed_pairs_is_written_down_and_holds():
     problem = discs_in_a_corridor(1.195)
     answer, _ = find_channel(problem)

@@ -8,6 +8,8 @@ from coop_drake.planning.search import find_channel
 from tests.support.passages import DiscDoor, FoldingArm, LadderCorner, RodCorridor
 from tests.support.soundness import assert_channel_is_sound
 
+pytestmark = pytest.mark.slow
+
 PASSAGES = (DiscDoor(), RodCorridor(), LadderCorner(), FoldingArm())
 NAMES = [type(passage).__name__ for passage in PASSAGES]
 EPS = 0.003
@@ -29,7 +31,6 @@ def test_just_below_the_critical_width_the_answer_is_a_proof(passage) -> None:
     assert answer.proved
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("offset", [0.0, 1e-4])
 @pytest.mark.parametrize("passage", PASSAGES[:3], ids=NAMES[:3])
 def test_near_the_critical_width_no_answer_is_wrong(passage, offset: float) -> None:

@@ -1,6 +1,7 @@
 """Whatever corridor, slices and gains: every hand-over is certified, comes, and nothing breaks after it."""
 
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -9,6 +10,7 @@ from tests.support.point_mass import carry_out, straight_fields
 from tests.support.random_plan import random_plan
 
 
+@pytest.mark.slow
 @settings(max_examples=12)
 @given(st.integers(0, 2**32 - 1))
 def test_every_hand_over_of_a_random_plan_is_safe_and_comes(seed):

@@ -20,6 +20,7 @@ from tests.support.planted import Planted, planted
 SLICES = 16
 
 
+@pytest.mark.slow
 @settings(max_examples=6, phases=[Phase.generate], suppress_health_check=list(HealthCheck))
 @given(planted(robots=(1, 2)))
 def test_a_path_known_to_be_free_lies_in_the_over_cells_of_all_relaxations(plant: Planted) -> None:

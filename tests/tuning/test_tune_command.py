@@ -29,6 +29,7 @@ def called(*arguments):
     return CliRunner().invoke(app, ["tune", *map(str, arguments)])
 
 
+@pytest.mark.slow
 def test_a_gain_set_comes_out_that_the_scenario_takes(room, tmp_path):
     result = called(room, "--runs", 2, "--workers", 1, "--vary", "age_phase", "--out", tmp_path, "--json")
     assert result.exit_code == 0, result.output

@@ -219,6 +219,7 @@ def test_a_budget_that_is_too_large_is_answered_with_one_that_holds(folder, tmp_
     assert ". Under more, in transition" in said
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("text", "key"),
     [

@@ -262,6 +262,7 @@ def test_every_entry_of_a_plan_is_compared_or_a_free_choice(name, required):
     check_kinds(case(name, required), slice(SCENARIOS.index(name), None, len(SCENARIOS)))
 
 
+@pytest.mark.slow
 def test_every_entry_of_a_way_that_limits_refuse_is_compared_or_a_free_choice():
     problem = room_with_pillar()
     problem = replace(problem, settings=replace(problem.settings, min_clearance=0.9))
@@ -304,6 +305,7 @@ def fields_of(kind, way=""):
     return [*own.values(), *(place for name, part in types.items() for place in fields_of(part, own[name]))]
 
 
+@pytest.mark.slow
 def test_every_field_of_a_plan_is_altered_in_one_of_these_tests():
     documents = [limited().document, *(case(name, True).document for name in SCENARIOS)]
     kinds = {kind for document in documents for kind in places(document)}

@@ -89,7 +89,7 @@ def test_a_gap_of_a_metre_between_cells_that_reach_far_away_is_seen(name, reach,
 
 @pytest.mark.slow
 @pytest.mark.no_cover
-@SCENARIOS
+@pytest.mark.parametrize("name", ["base", "pillar"])
 def test_honest_proofs_that_a_goal_is_blocked_hold_with_several_slices(name, tmp_path) -> None:
     problem = replace(scenario(name), goal_pose=np.array(BLOCKED_GOALS[name]))
     documents = answered(problem)
@@ -99,6 +99,7 @@ def test_honest_proofs_that_a_goal_is_blocked_hold_with_several_slices(name, tmp
     assert refusal(documents[1], problem, tmp_path) == ""
 
 
+@pytest.mark.slow
 @pytest.mark.no_cover
 @SCENARIOS
 def test_figures_and_goal_intervals_mean_what_is_executed(name, tmp_path) -> None:

@@ -113,6 +113,7 @@ def claimed(request, case, budgeted):
     return log, (plan, problem, replace(setup, **loose)), request.param == "braked"
 
 
+@pytest.mark.slow
 def test_every_array_of_a_log_is_compared_with_something_or_named_as_read(claimed):
     log, against, braked = claimed
     verified = verify_log(log, *against, braked=braked)

@@ -132,6 +132,7 @@ def first(plan, **change):
     return replace(plan, transitions=(replace(plan.transitions[0], **change), *plan.transitions[1:]))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seconds", [1e6, 59.0, 0.0])
 @pytest.mark.parametrize("stated", [(), (SLOW,), (replace(SLOW, value=61.0),)])
 def test_an_estimated_time_that_no_simulation_gives_makes_no_answer(found, seconds, stated):
@@ -163,6 +164,7 @@ def test_a_clearance_that_is_stated_too_small_is_not_below_a_limit(found, key):
         verify_plan(replace(small, refused_by=(replace(NARROW, value=1e-4),)), problem, GAINS)
 
 
+@pytest.mark.slow
 def test_a_way_says_all_limits_that_it_breaks_and_no_other(way):
     problem, plan = way
     assert {one.limit for one in plan.refused_by} == {SLOW.limit, NARROW.limit}

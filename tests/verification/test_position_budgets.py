@@ -141,6 +141,7 @@ def test_a_tube_without_a_budget_and_a_budget_without_a_tube_are_refused():
     assert check_position(without, TOLERANCE) == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("factor", [0.999, 1.001])
 @pytest.mark.parametrize("name", ["position", "velocity", "grasp", "turn"])
 def test_another_level_of_a_monitor_is_refused(name, factor):

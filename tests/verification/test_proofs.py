@@ -73,6 +73,7 @@ def test_proofs_are_stated_saved_and_verified(proofs, documents, tmp_path, kind)
     assert all(check.count > 0 for check in verified.checks)
 
 
+@pytest.mark.slow
 @pytest.mark.no_cover
 @pytest.mark.parametrize("kind", KINDS)
 def test_no_number_can_be_altered_be_it_by_a_bit(documents, tmp_path, kind):
@@ -100,6 +101,7 @@ def test_bounds_and_labels_are_refused_under_a_new_digest(documents, tmp_path):
             assert found is None or "touches" in found or "may hold the" in found
 
 
+@pytest.mark.slow
 @pytest.mark.no_cover
 def test_cells_that_are_accepted_under_a_new_digest_still_cover(documents, tmp_path):
     document = documents["slices"]
@@ -268,6 +270,7 @@ def test_a_goal_on_a_slanted_wall_is_blocked_where_one_piece_is_off_the_floor():
     assert verify_proof(proof, problem)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("beyond", [0.0, 1e-9, -1e-9])
 def test_a_goal_of_which_one_point_touches_a_wall_and_no_other_is_free_is_undecided(beyond):
     """Within its tolerance of 0.01 m the goal reaches to a touch, up to rounding."""
