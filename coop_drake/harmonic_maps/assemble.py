@@ -174,64 +174,42 @@ def _columns(*arrays: np.ndarray) -> FloatArray:
 
 def _pack_corners(
     angles: FloatArray, sources: IntArray, refined: Nodes, incoming: FloatArray, closeness: float
-) -> tuple[np.ndarray, FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Index table, grids, ring breakpoints, ring densities and tails of all corners."""
-    index, rings, tails = [], [], []
-    grids: dict[int, tuple[int, int, FloatArray, FloatArray]] = {}
-    first = [0, 0, 0, 0]  # grid node, break, ring, tail
+) -> tuple[IntArray, FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Index table, grids, ring breakpoints, ring densities and tails of all corners, as in `MapArrays`."""
+    index = np.zeros((len(angles) + 1, 7), dtype=np.int64)
+    index[:, 0] = sources
+    parts: tuple[list[FloatArray], ...] = ([], [], [], [])
     for k, angle in enumerate(angles):
         leg, ring = leg_panels(float(angle), closeness)
-        key = len(leg) * 1_000 + len(ring) if len(leg) == 2 else k + 1_000_000
-        if key not in grids:
-            grids[key] = (first[0], first[1], np.column_stack(panel_nodes(leg, REFINED_NODES)), ring)
-            first[0] += len(grids[key][2])
-            first[1] += len(ring)
-        at_grid, at_break, nodes, _ = grids[key]
+        grid = np.column_stack(panel_nodes(leg, REFINED_NODES))
         block = slice(refined.corner_start[k], refined.corner_start[k + 1])
-        ring_values, tail_values = _descend(float(angle), closeness, incoming[block])
-        index.append((sources[k], len(ring) - 1, len(nodes), at_grid, at_break, first[2], first[3]))
-        rings.append(ring_values)
-        tails.append(tail_values)
-        first[2] += len(ring_values)
-        first[3] += len(tail_values)
-    index.append((sources[-1], 0, 0, *first))
-    return (
-        np.array(index, dtype=np.int64),
-        np.concatenate([g[2] for g in grids.values()]),
-        np.concatenate([g[3] for g in grids.values()]),
-        np.concatenate(rings),
-        np.concatenate(tails),
-    )
+        index[k, 1:3] = len(ring) - 1, len(grid)
+        densities = _descend(float(angle), closeness, incoming[block])
+        for part, values in zip(parts, (grid, ring, *densities), strict=True):
+            part.append(values)
+    index[1:, 3:] = np.cumsum([[len(values) for values in part] for part in parts], axis=1).T
+    grids, breaks, rings, tails = (np.concatenate(part) for part in parts)
+    return index, grids, breaks, rings, tails
 
 
 def _descend(angle: float, closeness: float, incoming: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Densities of one corner at every level, from the field that comes in on its two legs (2 n, 2).
 
     Returns:
-        Ring densities in the boundary's direction, shape (LEVELS * 2 legs * m, REFINED, 2), and
+        Ring densities in the boundary's direction, shape (LEVELS * 2 legs * m, REFINED_NODES, 2), and
         weight-corrected densities of the legs, shape ((LEVELS + 1) * 2 legs * n, 2).
     """
     operator = corner_operator(angle, REFINED_NODES, closeness)
-    n = len(incoming) // 2
-    back, out = incoming[:n], incoming[n:]
-    fields = _descending(operator.inward, np.stack((0.5 * (out + back), 0.5 * (out - back))))
+    back, out = np.split(incoming, 2)
+    # Even and odd part of the incoming field at every level: columns (u, v) level by level.
+    fields, power = np.stack((0.5 * (out + back), 0.5 * (out - back))), operator.inward
+    while fields.shape[-1] < 2 * (LEVELS + 1):
+        fields, power = np.concatenate((fields, power @ fields), axis=-1), power @ power
+    fields = fields[..., : 2 * (LEVELS + 1)]
     ring = _legs(operator.ring @ fields[..., : 2 * LEVELS]).reshape(LEVELS, 2, -1, REFINED_NODES, 2)
     ring[:, 0] = ring[:, 0, :, ::-1]  # the boundary runs towards the corner on the incoming leg
     tail = _legs(operator.compressed @ fields)
     return ring.reshape(-1, REFINED_NODES, 2), tail.reshape(-1, 2)
-
-
-def _descending(inward: FloatArray, field: FloatArray) -> FloatArray:
-    """The field that comes in at every level, even and odd part: columns (u, v) level by level.
-
-    ``inward`` leads from one level to the next, shape (2, n, n); the field at the outermost level has shape
-    (2, n, 2), the result (2, n, 2 (LEVELS + 1)).
-    """
-    power = inward
-    while field.shape[-1] < 2 * (LEVELS + 1):
-        field = np.concatenate((field, power @ field), axis=-1)
-        power = power @ power
-    return field[..., : 2 * (LEVELS + 1)]
 
 
 def _legs(parts: FloatArray) -> FloatArray:
@@ -349,7 +327,10 @@ def _grown(m: MapArrays, *, opened: bool) -> MapArrays:
 
     ``opened``: whether corners may be opened into their rings, and panels have their refined densities.
     """
-    flat, scratch = flatten(m, np.zeros(2), 0.0), np.empty((6, _most_nodes(m)))
+    first = m.corner_index[:, 0]
+    per_panel = (m.sources.shape[1] - first[-1]) // max(len(m.panels), 1)
+    most = int(max(REFINED_NODES, per_panel, *np.diff(first), 2 * m.corner_index[:, 2].max()))
+    flat, scratch = flatten(m, np.zeros(2), 0.0), np.empty((6, most))
     todo = np.empty((LEVELS * (2 * max(int(m.corner_index[:, 1].max()), 1) + 1) + 1, 3), dtype=np.int64)
     boxes = m.boxes.copy()
     box = np.flatnonzero(boxes < 0)
@@ -383,14 +364,6 @@ def _grown(m: MapArrays, *, opened: bool) -> MapArrays:
         near_start=np.concatenate(([0], np.cumsum(counts))),
         near=np.concatenate([part.near for part in finished]),
     )
-
-
-def _most_nodes(m: MapArrays) -> int:
-    """Most nodes that one source has."""
-    first = m.corner_index[:, 0]
-    per_panel = (m.sources.shape[1] - first[-1]) // max(len(m.panels), 1)
-    blocks = np.concatenate((np.diff(first), 2 * m.corner_index[:, 2]))
-    return int(max(REFINED_NODES, per_panel, blocks.max()))
 
 
 @compiled(reassociate=True)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass
-from typing import Any, NamedTuple, NoReturn
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -15,14 +15,13 @@ from coop_drake.harmonic_maps.assemble import pack_layers
 from coop_drake.harmonic_maps.evaluate import FlatMap, MapArrays, evaluate_many, flatten, unflatten
 from coop_drake.harmonic_maps.outline import Outline, as_points, outline_of, region_to_map
 from coop_drake.harmonic_maps.panels import Panels, lay_panels, leg_panels
-from coop_drake.harmonic_maps.solve import solve_density
+from coop_drake.harmonic_maps.solve import Density, solve_density
 from coop_drake.tree.pose import ComplexArray, FloatArray, IntArray
 
 _GAIN = 4.0
 """Factor by which the error falls with every further node on a panel, approximately [-]."""
 _PROGRESS = 0.7
-"""An attempt that leaves more than this fraction of the error is the last: more nodes would not help either
-[-]."""
+"""An attempt that leaves more than this fraction of the error is the last: more nodes would not help [-]."""
 _LARGE = 2_000
 """Unknowns from which the first attempt, which rarely suffices then, is left out."""
 _EPSILON = float(np.finfo(float).eps)
@@ -73,23 +72,16 @@ class MapAccuracy:
         return values | {"worst_place": values["worst_place"].tolist()}
 
 
-class _Attempt(NamedTuple):
-    """A resolution: Gauss nodes on a panel, and longest panel per unit of distance (`leg_panels`)."""
-
-    nodes: int
-    closeness: float
-
-
-# Ten nodes suffice for most domains, thirteen for most large ones.
-_FEWEST = _Attempt(10, 1.5)
-_ATTEMPTS = (_FEWEST, _Attempt(13, 1.5), _Attempt(16, 1.5), _Attempt(16, 1.0), _Attempt(20, 0.7))
+_ATTEMPTS = (10, 1.5), (13, 1.5), (16, 1.5), (16, 1.0), (20, 0.7)
+"""Resolutions: Gauss nodes on a panel, and longest panel per unit of distance (`leg_panels`). Ten nodes
+suffice for most domains, thirteen for most large ones."""
 
 
 class Solution(NamedTuple):
     """The result of solving: everything that evaluates a map, as plain arrays and numbers.
 
     Attributes:
-        flat: The map for compiled code, see `flat_map`.
+        flat: The map for compiled code, see `evaluate`.
         goal_image: q_d, the goal's image in the disk, shape (2,).
         accuracy: How far the map is estimated to be from the true one.
     """
@@ -191,127 +183,86 @@ def _solve(outline: Outline, goal: Point | Polygon, tolerance: float) -> Solutio
             close to singular, as narrow gaps make it, that rounding alone may exceed the tolerance.
     """
     best: MapAccuracy | None = None
-    last = _FEWEST
-    for attempt in _ATTEMPTS:
-        if best is not None and not _is_promising(attempt, last, best.error_estimate / tolerance):
-            continue
-        panels = lay_panels(outline, attempt.closeness)
-        unknowns = _unknowns(outline, panels, attempt)
-        if attempt == _FEWEST and _LARGE <= unknowns <= _MAX_UNKNOWNS:
+    last = _ATTEMPTS[0]
+    # Rounded, so that equal corners share one operator in the cache.
+    angles = np.round(outline.corner_angles, 12)
+    for nodes, closeness in _ATTEMPTS:
+        if best is not None and closeness == last[1]:
+            final = max(other for other, same in _ATTEMPTS if same == closeness)
+            if nodes != final and _GAIN ** (nodes - last[0]) < best.error_estimate / tolerance:
+                continue
+        panels = lay_panels(outline, closeness)
+        legs = sum(2 * len(leg_panels(float(angle), closeness)[0]) - 2 for angle in angles)
+        unknowns = nodes * (len(panels.edge) + legs)
+        if (nodes, closeness) == _ATTEMPTS[0] and _LARGE <= unknowns <= _MAX_UNKNOWNS:
             continue
         if unknowns > _MAX_UNKNOWNS:
-            _refuse(best, tolerance, outline, panels, unknowns)
-        solution = _attempt(outline, goal, panels, attempt)
-        bound = solution.accuracy.error_estimate
-        if bound <= tolerance:
-            return solution
-        if best is not None and bound > _PROGRESS * best.error_estimate:
             break
-        best, last = solution.accuracy, attempt
+        solution = _attempt(outline, goal, panels, angles, nodes, closeness)
+        estimate = solution.accuracy.error_estimate
+        if estimate <= tolerance:
+            return solution
+        if best is not None and estimate > _PROGRESS * best.error_estimate:
+            break
+        best, last = solution.accuracy, (nodes, closeness)
         if _EPSILON * best.condition > tolerance:  # more nodes do not reduce rounding errors
             break
-    _refuse(best, tolerance, outline, panels, unknowns)
+    if best is None:
+        raise _too_large(outline, panels, unknowns)
+    rounding = _EPSILON * best.condition
+    why = f", and rounding alone may cost {rounding:.2g}" if rounding > tolerance else ""
+    raise UnmappableError(
+        f"the harmonic map is accurate to about {best.error_estimate:.2g}; {tolerance:.2g} was asked for"
+        f"{why}; at fault is {best.worst_place_description}",
+        (float(best.worst_place[0]), float(best.worst_place[1])),
+        angle=best.worst_angle,
+        width=best.worst_gap,
+    )
 
 
-def _is_promising(attempt: _Attempt, last: _Attempt, excess: float) -> bool:
-    """Whether an attempt may reduce the error by a factor; the last one of a closeness is always made."""
-    final = max(other.nodes for other in _ATTEMPTS if other.closeness == attempt.closeness)
-    gain = _GAIN ** (attempt.nodes - last.nodes)
-    return attempt.closeness != last.closeness or attempt.nodes == final or gain >= excess
-
-
-def _angles(outline: Outline) -> FloatArray:
-    """Angles of the corners [rad], rounded to 1e-12 so that equal corners share one operator in the cache."""
-    return np.round(outline.corner_angles, 12)
-
-
-def _unknowns(outline: Outline, panels: Panels, attempt: _Attempt) -> int:
-    """Size of the linear system without the holes' images."""
-    legs = sum(2 * len(leg_panels(float(angle), attempt.closeness)[0]) - 2 for angle in _angles(outline))
-    return attempt.nodes * (len(panels.edge) + legs)
-
-
-def _attempt(outline: Outline, goal: Point | Polygon, panels: Panels, attempt: _Attempt) -> Solution:
-    """Make one attempt."""
-    angles = _angles(outline)
-    centre = np.array([outline.centre.real, outline.centre.imag])
-    # Coordinates of points are rounded: a point outside by less than this counts as on the wall.
-    rounding = 8.0 * _EPSILON * (abs(outline.centre) + outline.diameter)
-    density = solve_density(outline, panels, angles, *attempt)
-    arrays = pack_layers(outline, panels, angles, density, attempt.closeness)
-    flat = flatten(arrays, centre, rounding)
-    unknowns = len(density.weighted) + outline.holes
-    accuracy = _estimate_accuracy(outline, panels, flat, density.hole_images, unknowns, density.condition)
-    return Solution(flat, _goal_image(outline, goal, density.hole_images, flat), accuracy)
-
-
-def _goal_image(
-    outline: Outline, goal: Point | Polygon, hole_images: FloatArray, flat: FlatMap
-) -> FloatArray:
-    """Image of the goal: a point of the circle, a hole's image, or the image of a point, shape (2,)."""
-    image: FloatArray
-    if outline.goal_angle is not None:
-        return np.array([np.cos(outline.goal_angle), np.sin(outline.goal_angle)])
-    if outline.goal_ring is not None:
-        image = hole_images[outline.goal_ring - 1].copy()
-    else:
-        images, _ = evaluate_many(flat, np.array(goal.coords)[:, :2] - flat[:2])
-        image = images[0]
-    return image
-
-
-def _refuse(
-    best: MapAccuracy | None, tolerance: float, outline: Outline, panels: Panels, unknowns: int
-) -> NoReturn:
-    """Raise an error with the place where the best attempt is worst, or the narrowest gap without one."""
-    if best is not None:
-        rounding = _EPSILON * best.condition
-        why = f", and rounding alone may cost {rounding:.2g}" if rounding > tolerance else ""
-        raise UnmappableError(
-            f"the harmonic map is accurate to about {best.error_estimate:.2g}; {tolerance:.2g} was asked for"
-            f"{why}; at fault is {best.worst_place_description}",
-            (float(best.worst_place[0]), float(best.worst_place[1])),
-            angle=best.worst_angle,
-            width=best.worst_gap,
-        )
+def _too_large(outline: Outline, panels: Panels, unknowns: int) -> UnmappableError:
+    """The refusal of a system of too many unknowns, by the narrowest gap."""
     k = int(np.argmin(panels.gap))
     edge = int(panels.edge[k])
     tangent = (outline.ends - outline.vertices)[edge]
     place = outline.vertices[edge] + 0.5 * (panels.start + panels.end)[k] * tangent / abs(tangent)
-    fault = _find_fault(outline, panels, place, edge)
+    description, angle, width = _find_fault(outline, panels, place, edge)
     where = place + outline.centre
-    raise UnmappableError(
+    return UnmappableError(
         f"the harmonic map would take {unknowns} unknowns, at most {_MAX_UNKNOWNS} are allowed; narrowest is "
-        + fault.description,
+        + description,
         (where.real, where.imag),
-        angle=fault.angle,
-        width=fault.gap,
+        angle=angle,
+        width=width,
     )
 
 
-class _Fault(NamedTuple):
-    """A corner or a gap that limits the accuracy.
+def _attempt(
+    outline: Outline,
+    goal: Point | Polygon,
+    panels: Panels,
+    angles: FloatArray,
+    nodes: int,
+    closeness: float,
+) -> Solution:
+    """Solve with so many nodes on a panel, evaluate the goal's image and estimate the error."""
+    density = solve_density(outline, panels, angles, nodes, closeness)
+    arrays = pack_layers(outline, panels, angles, density, closeness)
+    # Coordinates of points are rounded: a point outside by less than this counts as on the wall.
+    rounding = 8.0 * _EPSILON * (abs(outline.centre) + outline.diameter)
+    flat = flatten(arrays, np.array([outline.centre.real, outline.centre.imag]), rounding)
+    if outline.goal_angle is not None:
+        image = np.array([np.cos(outline.goal_angle), np.sin(outline.goal_angle)])
+    elif outline.goal_ring is not None:
+        image = density.hole_images[outline.goal_ring - 1].copy()
+    else:
+        image = evaluate_many(flat, np.array(goal.coords)[:, :2] - flat[:2])[0][0]
+    return Solution(flat, image, _estimate_accuracy(outline, panels, flat, density))
 
-    Attributes:
-        description: Its name.
-        angle: Interior angle of the corner [degrees], None for a gap.
-        gap: Width of the gap [m], None for a corner.
-    """
 
-    description: str
-    angle: float | None
-    gap: float | None
-
-
-def _estimate_accuracy(
-    outline: Outline, panels: Panels, flat: FlatMap, hole_images: FloatArray, unknowns: int, condition: float
-) -> MapAccuracy:
-    """Sample the residual on every panel and far down every corner of a map, evaluated as its users do.
-
-    The images of the holes, c_k, have shape (holes, 2); the size of the linear system and its condition are
-    reported as they are given.
-    """
-    position, expected, edge = _samples(outline, panels, hole_images)
+def _estimate_accuracy(outline: Outline, panels: Panels, flat: FlatMap, density: Density) -> MapAccuracy:
+    """Sample the residual on every panel and far down every corner of a map, evaluated as its users do."""
+    position, expected, edge = _samples(outline, panels, density.hole_images)
     vertices = np.minimum(np.abs(position - outline.vertices[edge]), np.abs(position - outline.ends[edge]))
     clear = vertices > 100.0 * flat[2]  # rounding would move closer samples across the other wall
     position, expected, edge = position[clear], expected[clear], edge[clear]
@@ -320,17 +271,14 @@ def _estimate_accuracy(
     residuals = np.where(np.isfinite(residuals), residuals, np.inf)
     worst = int(np.argmax(residuals))
     place = position[worst] + outline.centre
-    fault = _find_fault(outline, panels, position[worst], int(edge[worst]))
     return MapAccuracy(
-        residual=float(residuals[worst]),
-        error_estimate=float((2 * outline.holes + 1) * residuals[worst]),
-        samples=len(position),
-        unknowns=unknowns,
-        condition=condition,
-        worst_place=np.array([place.real, place.imag]),
-        worst_place_description=fault.description,
-        worst_angle=fault.angle,
-        worst_gap=fault.gap,
+        float(residuals[worst]),
+        float((2 * outline.holes + 1) * residuals[worst]),
+        len(position),
+        len(density.weighted) + outline.holes,
+        density.condition,
+        np.array([place.real, place.imag]),
+        *_find_fault(outline, panels, position[worst], int(edge[worst])),
     )
 
 
@@ -346,40 +294,39 @@ def _samples(
     corners = np.repeat(np.arange(len(length)), depth.size)
     before = outline.preceding[corners]
     edge = np.concatenate((np.repeat(panels.edge, _ON_PANEL.size), corners, before)).astype(np.int64)
-    s = np.concatenate((on_panels, legs, length[before] - legs))
-    part = s / length[edge]
+    part = np.concatenate((on_panels, legs, length[before] - legs)) / length[edge]
     angle = outline.angle_start[edge] + (outline.angle_end - outline.angle_start)[edge] * part
-    ring = outline.ring[edge]
     constants = np.concatenate(([0.0], hole_images @ np.array([1.0, 1.0j])))
-    expected = np.where(ring == 0, np.exp(1j * angle), constants[ring])
+    expected = np.where(outline.ring[edge] == 0, np.exp(1j * angle), constants[outline.ring[edge]])
     return outline.vertices[edge] + (outline.ends - outline.vertices)[edge] * part, expected, edge
 
 
-def _find_fault(outline: Outline, panels: Panels, place: complex, edge: int) -> _Fault:
-    """Name the corner or the gap at a place of the boundary."""
-    for vertex in (edge, int(outline.following[edge])):
-        if abs(place - outline.vertices[vertex]) <= 1.5 * panels.legs[vertex]:
-            return _fault_at_corner(outline, vertex)
-    along = abs(place - outline.vertices[edge])
-    own = np.flatnonzero(panels.edge == edge)
-    nearest = own[np.argmin(np.abs(0.5 * (panels.start + panels.end)[own] - along))]
-    return _gap_of(float(panels.gap[nearest]), place + outline.centre)
+def _find_fault(
+    outline: Outline, panels: Panels, place: complex, edge: int
+) -> tuple[str, float | None, float | None]:
+    """Name what limits the accuracy at a place of the boundary.
 
+    Near a vertex that is its corner, unless another wall is far nearer than the corner's own walls are long.
 
-def _fault_at_corner(outline: Outline, vertex: int) -> _Fault:
-    """The corner, or a gap between it and another wall that is far narrower than its own walls are long."""
-    place, starts, ends = outline.vertices[vertex], outline.vertices, outline.ends
-    along = np.clip(np.real((place - starts) / (ends - starts)), 0.0, 1.0)
-    distance = np.abs(starts + along * (ends - starts) - place)
-    own = [int(outline.preceding[vertex]), vertex]
-    gap = float(np.delete(distance, own).min(initial=np.inf))
+    Returns:
+        The name of the corner or the gap; the corner's interior angle [degrees]; the gap's width [m].
+    """
+    starts, ends = outline.vertices, outline.ends
+    near = [k for k in (edge, int(outline.following[edge])) if abs(place - starts[k]) <= 1.5 * panels.legs[k]]
+    if near:
+        place = starts[near[0]]
+        along = np.clip(np.real((place - starts) / (ends - starts)), 0.0, 1.0)
+        own = [int(outline.preceding[near[0]]), near[0]]
+        distance = np.abs(starts + along * (ends - starts) - place)
+        gap = float(np.delete(distance, own).min(initial=np.inf))
+        corner = gap >= _NARROW * np.abs(ends - starts)[own].min()
+    else:
+        away = np.abs(0.5 * (panels.start + panels.end) - abs(place - starts[edge]))
+        gap = float(panels.gap[np.argmin(np.where(panels.edge == edge, away, np.inf))])
+        corner = False
     where = place + outline.centre
-    if gap < _NARROW * np.abs(ends - starts)[own].min():
-        return _gap_of(gap, where)
-    angle = float(np.rad2deg(outline.corner_angles[vertex]))
-    corner = f"the corner at ({where.real:.6g}, {where.imag:.6g}) m"
-    return _Fault(f"{corner} with interior angle {angle:.4g} degrees", angle, None)
-
-
-def _gap_of(width: float, where: complex) -> _Fault:
-    return _Fault(f"the gap of {width:.3g} m at ({where.real:.6g}, {where.imag:.6g}) m", None, width)
+    at = f"at ({where.real:.6g}, {where.imag:.6g}) m"
+    if corner:
+        angle = float(np.rad2deg(outline.corner_angles[near[0]]))
+        return f"the corner {at} with interior angle {angle:.4g} degrees", angle, None
+    return f"the gap of {gap:.3g} m {at}", None, gap

@@ -64,40 +64,36 @@ class MapStore:
 
     def files(self) -> list[Path]:
         """The files of the folder, the one used last at the end."""
-        return [path for _, _, path in self._by_age()]
+        return list(self._sizes())
 
     def size(self) -> int:
         """Size of all files [bytes]."""
-        return sum(size for _, size, _ in self._by_age())
+        return sum(self._sizes().values())
 
     def trim(self) -> None:
         """Remove the maps used longest ago until the rest keeps within the limit."""
-        files = self._by_age()
-        total = sum(size for _, size, _ in files)
-        for _, size, path in files:
+        sizes = self._sizes()
+        total = sum(sizes.values())
+        for path, size in sizes.items():
             if total <= self.limit:
                 break
             with suppress(OSError):
                 path.unlink()
             total -= size
 
-    def clear(self) -> int:
-        """Remove all maps; return how many there were."""
-        files = self.files()
-        for path in files:
+    def clear(self) -> None:
+        """Remove all maps."""
+        for path in self.files():
             path.unlink(missing_ok=True)
-        return len(files)
 
-    def _by_age(self) -> list[tuple[int, int, Path]]:
-        """(time of last use, size, path) of every file, oldest first."""
+    def _sizes(self) -> dict[Path, int]:
+        """Size of every file [bytes], by the time of its last use, oldest first."""
         rows = []
         for path in self.folder.glob("*" + _SUFFIX):
-            try:
+            with suppress(FileNotFoundError):  # another process has removed it meanwhile
                 status = path.stat()
-            except FileNotFoundError:  # another process has removed it meanwhile
-                continue
-            rows.append((status.st_mtime_ns, status.st_size, path))
-        return sorted(rows)
+                rows.append((status.st_mtime_ns, status.st_size, path))
+        return {path: size for _, size, path in sorted(rows)}
 
 
 def _key(domain: Polygon, goal: Point | Polygon, tolerance: float) -> str:
@@ -123,16 +119,14 @@ def _code() -> bytes:
 
 
 def _read(path: Path, key: str) -> Solution | None:
-    """Read a solution; None if there is none, or if the file is damaged."""
+    """Read a solution; None if there is none, or if the file is damaged or of another question."""
     try:
         with path.open("rb") as stream, np.load(stream, allow_pickle=False) as file:
             if file["key"].item() != key:
                 return None
-            solution = Solution(
-                flat=file["flat"],
-                goal_image=file["goal_image"],
-                accuracy=_accuracy(file["accuracy"].item()),
-            )
+            values: dict[str, Any] = json.loads(file["accuracy"].item())
+            accuracy = MapAccuracy(**values | {"worst_place": np.array(values["worst_place"])})
+            solution = Solution(file["flat"], file["goal_image"], accuracy)
         path.touch()  # used just now
     except _DAMAGE:
         return None
@@ -147,8 +141,3 @@ def _write(path: Path, key: str, solution: Solution) -> None:
         write_atomically(
             path, lambda file: np.savez(file, key=key, flat=flat, goal_image=image, accuracy=accuracy)
         )
-
-
-def _accuracy(text: str) -> MapAccuracy:
-    values: dict[str, Any] = json.loads(text)
-    return MapAccuracy(**values | {"worst_place": np.array(values["worst_place"])})
