@@ -112,8 +112,7 @@ def _watch(
     folder.begin("search")
     with reporter.stage("drawing") as progress:
         written = watching.write_pictures(recording, shown, folder.path, progress)
-    with reporter.stage("scene") as progress:
-        written.append(watching.write_scene(recording, shown, folder.path / "think.html", progress))
+    written.append(watching.write_scene(recording, shown, folder.path / "think.html"))
     reporter.facts["bytes"] = {path.name: path.stat().st_size for path in written}
     reporter.say(f"[bold]{escape(shown[-1].headline)}[/]")
     place, page = escape(str(folder.path)), escape(str(written[-1]))

@@ -6,6 +6,7 @@ import base64
 import gzip
 import json
 import re
+from math import pi
 
 import numpy as np
 import pytest
@@ -17,6 +18,7 @@ from coop_drake.drawing.colours import CHANNEL, REACHED, UNDECIDED, UNREACHED
 from coop_drake.watching import keyframes, scene_page, write_pictures
 from coop_drake.watching.keyframe_figure import keyframe_figure
 from coop_drake.watching.pictures import on_sheet
+from coop_drake.watching.theta_layers import on_turn
 from tests.watching.rods import NARROW, WIDE, rod_recording
 
 
@@ -82,51 +84,41 @@ def test_the_last_picture_of_a_proof_shows_the_two_parts_in_two_colours():
     assert figure.texts[0].get_text().startswith("Infeasible, proved")
 
 
-def test_the_page_holds_surroundings_slabs_channel_and_halved_layers_by_name(shown):
+def objects(page):
+    """The paths of what a page shows."""
+    return {one["path"].removeprefix("/think/") for one in commands(page) if one["type"] == "set_object"}
+
+
+ENDS = {f"{end}/{part}" for end in ("start", "goal") for part in ("footprint", "pole")}
+SURROUNDINGS = {"floor", "walls", "theta", *ENDS}
+
+
+def test_the_page_shows_the_last_channel_and_the_way_through_it(shown):
+    recorded, frames, page = shown
+    assert objects(page) == SURROUNDINGS | {"cells/proved", "way/proved"}
+    assert frames[-1].headline in page
+    earlier = next(k for k, frame in enumerate(frames) if frame.state.channel)
+    before = objects(scene_page(recorded, frames[: earlier + 1]))
+    assert {"cells/undecided", "way/undecided"} <= before
+
+
+def test_cells_are_as_high_as_their_intervals_of_theta(shown):
     _, frames, page = shown
-    names = {command["path"] for command in commands(page) if command["type"] == "set_object"}
-    for name in ("floor", "walls", "theta", "start/footprint", "start/pole", "goal/footprint", "goal/pole"):
-        assert f"/think/{name}" in names
-    assert any(name.startswith("/think/cells/undecided/") for name in names)
-    assert any(name.startswith("/think/path/undecided/") for name in names)
-    assert any(name.startswith("/think/halved/") for name in names)
-    last = f"{len(frames):03d}-{len(frames):03d}"
-    assert {f"/think/cells/proved/{last}", f"/think/path/proved/{last}"} <= names
-    assert not names & {f"/think/cells/undecided/{last}", f"/think/path/undecided/{last}"}
+    (cells,) = [one for one in commands(page) if one.get("path") == "/think/cells/proved"]
+    (geometry,) = cells["object"]["geometries"]
+    heights = np.frombuffer(geometry["data"]["attributes"]["position"]["array"].data, np.float32)[2::3]
+    lower, upper = np.transpose(
+        [part for cell in frames[-1].state.channel for part in on_turn(cell.intervals[0])]
+    )
+    assert 0.5 <= heights.min() == pytest.approx(0.5 + 6.0 * (lower.min() + pi / 4) / (2 * pi), abs=0.1)
+    assert heights.max() == pytest.approx(0.5 + 6.0 * (upper.max() + pi / 4) / (2 * pi), abs=0.1)
 
 
-def test_the_scene_of_a_proof_ends_with_the_two_components():
+def test_the_scene_of_a_proof_shows_the_two_components():
     recorded = rod_recording(NARROW)
-    frames = keyframes(recorded, 3)
-    page = scene_page(recorded, frames)
-    names = {command["path"] for command in commands(page) if command["type"] == "set_object"}
-    assert {"/think/reached/003-003", "/think/others/003-003"} <= names
+    page = scene_page(recorded, keyframes(recorded, 3))
+    assert {"reached", "others"} <= objects(page)
     assert "cannot be reached" in page
-
-
-def test_what_a_keyframe_shows_is_visible_then_and_never_else(shown):
-    _, frames, page = shown
-    (animation,) = [command for command in commands(page) if command["type"] == "set_animation"]
-    moving = {command["path"] for command in commands(page) if command["type"] == "set_object"}
-    for entry in animation["animations"]:
-        assert entry["path"] in moving
-        (track,) = entry["clip"]["tracks"]
-        keys = {key["time"]: key["value"] for key in track["keys"]}
-        first, last = (int(part) - 1 for part in entry["path"].rsplit("/", 1)[1].split("-"))
-        shown_at = []
-        value = None
-        for number in range(len(frames)):
-            value = keys.get(number, value)
-            if value:
-                shown_at.append(number)
-        assert shown_at == list(range(first, last + 1))
-        assert max(keys) == len(frames)
-
-
-def test_the_scene_of_the_page_is_as_large_as_its_pane_which_labels_are_placed_in(shown):
-    _, _, page = shown
-    assert "viewer.set_3d_pane_size(pane.clientWidth, pane.clientHeight)" in page
-    assert "new ResizeObserver(fit).observe(pane)" in page
 
 
 def test_the_page_is_small_needs_no_network_and_repeats(shown):
@@ -135,5 +127,3 @@ def test_the_page_is_small_needs_no_network_and_repeats(shown):
     fetched = re.findall(r"""<(?:script|cell|img|iframe)\b[^>]*?\b(?:src|href)=["']?([^"'>\s]+)""", page)
     assert all(address.startswith("data:") for address in fetched)
     assert page == scene_page(recorded, frames)
-    for frame in frames:
-        assert json.dumps(frame.headline)[1:-1] in page

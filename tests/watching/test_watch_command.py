@@ -36,9 +36,7 @@ def test_a_recording_leaves_pictures_and_a_page_and_none_of_an_older_one(room, t
 def test_the_exit_code_says_that_there_is_no_path_and_a_margin_proves_nothing(tmp_path, monkeypatch):
     # The files are tested above.
     monkeypatch.setattr(watching, "write_pictures", lambda recording, frames, directory, progress: [])
-    monkeypatch.setattr(
-        watching, "write_scene", lambda recording, frames, path, progress: write_atomically(path, b"")
-    )
+    monkeypatch.setattr(watching, "write_scene", lambda recording, frames, path: write_atomically(path, b""))
     below, above = [[4, 0], [4, 1.8], [5, 1.8], [5, 0]], [[5, 4], [5, 2.2], [4, 2.2], [4, 4]]
     outer = [[0, 0], *below, [9, 0], [9, 4], *above, [0, 4]]
     path = write_scenario(
