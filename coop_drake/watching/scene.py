@@ -74,8 +74,8 @@ _KEY = (
     (colours.UNREACHED, "cannot be reached"),
 )
 _NOTE = (
-    "The floor lies below, the object's angle θ points upwards, with marks at 0, π/2, π and 3π/2: each cell is "
-    "as high as its interval of θ. Joints have no direction here. Poles stand at start and goal."
+    "The floor lies below, the object's angle θ points upwards, with marks at 0, π/2, π and 3π/2: each cell "
+    "is as high as its interval of θ. Joints have no direction here. Poles stand at start and goal."
 )
 _VIEWER = Path(meshcat.__file__).parent / "viewer" / "dist" / "main.min.js"
 _PAGE = """<!DOCTYPE html>
