@@ -15,7 +15,8 @@ from coop_drake.answers import PlanningProblem
 from coop_drake.answers.plan import Plan
 from coop_drake.errors import ScenarioError
 from coop_drake.laws import GainSet
-from coop_drake.planning.channel import Channel, FreeBox
+from coop_drake.planning.cells.cells import FreeBox
+from coop_drake.planning.channel import Channel
 from coop_drake.planning.transitions import make_plan
 from coop_drake.scenario import Goal, ObjectPose, Scenario, Start, Tolerances, Workspace
 from paper.table_1 import ANGLE_TOLERANCE, CORRECTED, GOAL_ANGLE, START

@@ -1,20 +1,13 @@
-"""Paths of the whole team: one through a channel, and a proof that a given one is free."""
+"""A proof that a given path of the whole team is free."""
 
 from __future__ import annotations
-
-from itertools import pairwise
 
 from coop_drake.answers import PlanningProblem
 from coop_drake.errors import GeometryError
 from coop_drake.geometry.body_pairs import BodyPairs
-from coop_drake.geometry.parts import parts_of
-from coop_drake.geometry.passage import pole
 from coop_drake.geometry.swept_tree import SweptTree
-from coop_drake.planning import Channel
 from coop_drake.planning.boxes import Certifier
-from coop_drake.planning.channel import ended
 from coop_drake.planning.questions import exact_footprint, marginal_workspace
-from coop_drake.planning.transitions import path_through
 from coop_drake.tree.levers import configuration_scale
 from coop_drake.tree.pose import FloatArray
 
@@ -37,17 +30,3 @@ def is_free(problem: PlanningProblem, path: FloatArray) -> tuple[bool, int]:
     except GeometryError:
         return False, 0
     return proved, certifier.trials
-
-
-def widest_path(problem: PlanningProblem, channel: Channel) -> FloatArray:
-    """A path through a channel that leaves each box where its overlap with the next one is widest.
-
-    Returns:
-        Configurations from start to goal, circular axes unwrapped, shape (m, 3 + n) [m, rad].
-    """
-    targets = []
-    for one, other in pairwise(channel.boxes):
-        poles = map(pole, parts_of(one.polygon.intersection(other.polygon)))
-        targets.append(max(poles, key=lambda found: found[1])[0])
-    problem = ended(problem, channel)
-    return path_through(problem, channel, [*targets, problem.goal_pose[:2]])

@@ -6,13 +6,14 @@ from dataclasses import dataclass, replace
 from enum import Enum
 
 from coop_drake.answers import PlanningProblem
-from coop_drake.diagnosis.paths import is_free, widest_path
+from coop_drake.diagnosis.paths import is_free
 from coop_drake.errors import GeometryError, PlanError
 from coop_drake.planning.cells.exploration import Verdict
-from coop_drake.planning.channel import explored_channel
+from coop_drake.planning.channel import ended, make_channel
 from coop_drake.planning.proofs import Proofs
 from coop_drake.planning.sampled_search import SampledSearch
 from coop_drake.planning.sampling.collision import densified
+from coop_drake.planning.transitions import path_through
 from coop_drake.progress import Progress
 from coop_drake.tree.levers import configuration_scale
 from coop_drake.tree.pose import FloatArray
@@ -92,7 +93,8 @@ class BudgetedPlanner:
         if verdict is not Verdict.FOUND:
             return Outcome(variant, Answer.UNDECIDED)
         try:
-            path = widest_path(variant, explored_channel(variant, proofs.boxes()))
+            channel = make_channel(variant, proofs.boxes(), 0.0, None)
+            path = path_through(ended(variant, channel), channel)
         except (GeometryError, PlanError):  # A cell with a cusp: the channel is proved free all the same.
             return Outcome(variant, Answer.FOUND)
         return Outcome(variant, Answer.FOUND, densified(path, configuration_scale(variant.tree), STEP))

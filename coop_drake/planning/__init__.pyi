@@ -1,4 +1,5 @@
-from .channel import Channel, FreeBox, NoChannel
+from .cells.cells import FreeBox
+from .channel import Channel, NoChannel
 from .duration import plan_time
 from .search import find_channel
 from .transitions import make_plan, reschedule

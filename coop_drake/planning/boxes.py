@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from math import hypot
 from typing import NamedTuple
 
@@ -14,7 +13,8 @@ from coop_drake.compiled import compiled
 from coop_drake.geometry.body_pairs import TOUCH, BodyPairs
 from coop_drake.geometry.distances import separated
 from coop_drake.geometry.piece_sweeps import joint_width, over_joint, rounded_sweep
-from coop_drake.geometry.swept_tree import Intervals, SweptTree
+from coop_drake.geometry.swept_tree import SweptTree
+from coop_drake.planning.cells.cells import FreeBox
 from coop_drake.planning.duration import SETTLING_TIME, SPEED_PER_CLEARANCE
 from coop_drake.planning.sampling.collision import ObstacleGrid, densified, grid_inside, ring_clearance
 from coop_drake.tree.pose import FloatArray, IntArray
@@ -129,7 +129,7 @@ def swept_piece(
 
 
 @compiled
-def bodies_apart(boxes: BoxArrays, sweeps: PairSweeps, swept: FloatArray) -> bool:
+def sweeps_apart(boxes: BoxArrays, sweeps: PairSweeps, swept: FloatArray) -> bool:
     """Whether no two bodies touch anywhere in a box: their over-sweeps are separated.
 
     Args:
@@ -220,7 +220,7 @@ def box_clearance(
                 <= enough
             ):
                 return -1.0
-    if not bodies_apart(boxes, sweeps, swept):
+    if not sweeps_apart(boxes, sweeps, swept):
         return -1.0
     least, passed = np.inf, 0.0
     for at in range(start, end + 1):
@@ -286,7 +286,7 @@ def clearances_in_box(
             result[k] = ring_clearance(grid, ring, 0, len(ring), 0.0, disc, x, y, 1.0, 0.0, result[k])
             if result[k] < 0.0:
                 return result[:0]
-    return result if bodies_apart(boxes, sweeps, swept) else result[:0]
+    return result if sweeps_apart(boxes, sweeps, swept) else result[:0]
 
 
 @compiled
@@ -394,20 +394,6 @@ FIRST_REACH = 4
 """Samples in the first box that is tried, before the length of any box is known."""
 
 
-@dataclass(frozen=True)
-class PathBox:
-    """A free box along a path.
-
-    Attributes:
-        intervals: Intervals of (theta, q...).
-        positions: Positions p_WL; the team is free at every point of the polyline through them, for all
-            angles in the intervals, shape (k, 2) [m].
-    """
-
-    intervals: Intervals
-    positions: FloatArray
-
-
 class Certifier:
     """Covers paths with boxes in one workspace.
 
@@ -447,7 +433,7 @@ class Certifier:
         *,
         longest: bool = False,
         smallest: bool = False,
-    ) -> list[PathBox] | None:
+    ) -> list[FreeBox] | None:
         """Cover a path with boxes, from its first to its last configuration.
 
         Args:
@@ -463,7 +449,7 @@ class Certifier:
         levels = SMALLEST_LEVELS if smallest else FIRST_LEVELS if longest else LEVELS
         finest = SMALLEST_SPACING if smallest else FINEST_SPACING
         samples = densified(path, self._scale, SPACING)
-        boxes: list[PathBox] = []
+        boxes: list[FreeBox] = []
         i, self._level = 0, 0
         while i < len(samples) - 1:
             found = self._next_box(samples, i, longest, levels)
@@ -480,7 +466,7 @@ class Certifier:
 
     def _next_box(
         self, samples: FloatArray, i: int, longest: bool, levels: tuple[tuple[float, float], ...]
-    ) -> tuple[int, PathBox] | None:
+    ) -> tuple[int, FreeBox] | None:
         """The box that begins at sample i, and the sample at which it ends; None if there is none.
 
         Levels wider than that of the box before by more than one are not tried: they would fail in narrow
@@ -497,8 +483,7 @@ class Certifier:
             if j > i:
                 self._level = level
                 lower, upper = padded(self._boxes, samples, i, j, pad)
-                intervals = tuple((float(a), float(b)) for a, b in zip(lower, upper, strict=True))
-                return j, PathBox(intervals, samples[i : j + 1, :2].copy())
+                return j, FreeBox(Polygon(), Polygon(), lower, upper, samples[i : j + 1, :2].copy())
         return None
 
 

@@ -7,6 +7,7 @@ from itertools import pairwise
 from math import ceil
 
 import numpy as np
+from shapely import Polygon
 from shapely.errors import ShapelyError
 
 from coop_drake.answers.digest import problem_digest
@@ -14,13 +15,13 @@ from coop_drake.answers.plan import Plan
 from coop_drake.answers.problem import PlanningProblem
 from coop_drake.errors import GeometryError, PlanError, StallError, TooQuickError
 from coop_drake.geometry.body_pairs import BodyPairs
-from coop_drake.geometry.minkowski import to_polygon
 from coop_drake.geometry.swept_tree import SweptTree
 from coop_drake.laws import GainSet
 from coop_drake.laws.gain_schedule import schedule_of
 from coop_drake.planning.box_choice import Waypoints, choose_boxes
-from coop_drake.planning.boxes import BoxArrays, PathBox, box_arrays, longest_box
-from coop_drake.planning.channel import Channel, CoveredPath, FreeBox, Regions
+from coop_drake.planning.boxes import BoxArrays, box_arrays, longest_box
+from coop_drake.planning.cells.cells import FreeBox
+from coop_drake.planning.channel import Channel, CoveredPath, Regions
 from coop_drake.planning.duration import estimated, plan_time, timed
 from coop_drake.planning.limits import NEED_FACTOR, limits_of
 from coop_drake.planning.questions import shrunk
@@ -192,11 +193,7 @@ def _proved(waypoints: Waypoints, regions: Regions, first: int, last: int, pad: 
     part, width = waypoints.path[first : last + 1], waypoints.pads[pad]
     lower = np.maximum(waypoints.boxes.lower, part[:, 2:].min(axis=0) - width)
     upper = np.minimum(waypoints.boxes.upper, part[:, 2:].max(axis=0) + width)
-    intervals = tuple(zip(lower.tolist(), upper.tolist(), strict=True))
-    box = regions.around(PathBox(intervals, part[:, :2].copy()))
-    if box is None:
-        return None
-    return FreeBox(to_polygon(box.full.section), to_polygon(box.core.section), lower, upper)
+    return regions.around(FreeBox(Polygon(), Polygon(), lower, upper, part[:, :2].copy()))
 
 
 def quickest_plan(

@@ -3,44 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
 import shapely
-from shapely import MultiPolygon, Polygon
+from shapely import MultiPolygon, Point, Polygon
 
 from coop_drake.answers.mixed_cell import MixedCell
 from coop_drake.answers.problem import PlanningProblem
 from coop_drake.answers.proof import InfeasibilityProof
+from coop_drake.errors import PlanError
 from coop_drake.geometry.body_pairs import BodyPairs
+from coop_drake.geometry.boundary import BoundaryDistance
 from coop_drake.geometry.minkowski import FreeSpace, to_polygon
 from coop_drake.geometry.parts import parts_of
 from coop_drake.geometry.passage import pole
 from coop_drake.geometry.swept_tree import Intervals, SweptTree
-from coop_drake.planning.boxes import PathBox
-from coop_drake.planning.cells.cells import CellMaker, Region, end_in, regions_of
+from coop_drake.planning.cells.cells import CellMaker, FreeBox, Region, end_in, regions_of
 from coop_drake.planning.questions import disc_polygon, ending_at, is_patched, marginal_workspace, nearby
 from coop_drake.tree.circles import nearest_turn, turns_to
 from coop_drake.tree.pose import FloatArray
-
-
-@dataclass(frozen=True)
-class FreeBox:
-    """A set of configurations proved free: every position in ``polygon`` with every angle in the intervals.
-
-    Attributes:
-        polygon: Positions p_WL, one connected component of the under-approximation at margin zero [m].
-        core: The positions that keep the plan's margin, one connected component; a subset of ``polygon`` [m].
-        lower: Lower ends of (theta, q...), expanded by the overlap, circular axes unwrapped, shape
-            (1 + n,) [rad, m].
-        upper: Upper ends, shape (1 + n,).
-    """
-
-    polygon: Polygon
-    core: Polygon
-    lower: FloatArray
-    upper: FloatArray
 
 
 @dataclass(frozen=True)
@@ -66,20 +49,42 @@ class Channel:
     end: FloatArray | None = None
 
 
+def exits(channel: Channel) -> list[FloatArray]:
+    """Where boxes may be left: the middle of the widest part of each two cores' overlap.
+
+    Where a path leaves the boxes, it is the part in which that happens: overlaps that are a tenth of a
+    millimetre wide may have parts that their boxes do not join.
+
+    Returns:
+        Positions, shape (2,) each [m].
+
+    Raises:
+        PlanError: If two cores do not overlap; names them.
+    """
+    found = []
+    for index, (one, other) in enumerate(pairwise(channel.boxes)):
+        parts = [part for part in parts_of(one.core.intersection(other.core)) if part.area > 0.0]
+        if not parts:
+            raise PlanError(f"cells {index} and {index + 1}: their cores do not overlap")
+        if channel.ends is not None:
+            left = Point(channel.ends[index])
+            parts = [part for part in parts if part.covers(left)] or parts
+        found.append(max(map(pole, parts), key=lambda middle: middle[1])[0])
+    return found
+
+
 def middle_of(channel: Channel, start: FloatArray) -> FloatArray:
     """Configurations in the middle of each two boxes' overlap, after the start, shape (m, 3 + n) [m, rad].
 
     They are free; what is between them need not be.
 
     Raises:
-        GeometryError: If two boxes have no position in common.
+        PlanError: If two cores do not overlap.
     """
     rows = [start]
-    for one, other in pairwise(channel.boxes):
-        parts = parts_of(one.core.intersection(other.core))
-        centre, _ = pole(max(parts, key=lambda part: part.area, default=Polygon()))
+    for (one, other), place in zip(pairwise(channel.boxes), exits(channel), strict=True):
         angles = 0.5 * (np.maximum(one.lower, other.lower) + np.minimum(one.upper, other.upper))
-        rows.append(np.concatenate((centre, angles)))
+        rows.append(np.concatenate((place, angles)))
     return np.array(rows)
 
 
@@ -133,21 +138,6 @@ MANY_COORDINATES = 150
 whole floor would take most of the time."""
 
 
-@dataclass(frozen=True)
-class Box:
-    """A free box with its positions.
-
-    Attributes:
-        intervals: Expanded intervals of (theta, q...).
-        full: Positions that are free at no margin.
-        core: Positions that are free at the plan's margin; a subset of ``full``.
-    """
-
-    intervals: Intervals
-    full: Region
-    core: Region
-
-
 class Regions:
     """Computes the free positions of boxes along a path.
 
@@ -167,8 +157,8 @@ class Regions:
         self._full = None if self._large else self._maker(self._floor)
         self._core = None if self._large or self._narrow is None else self._maker(self._narrow)
 
-    def around(self, box: PathBox) -> Box | None:
-        """The free positions that are connected to a box's positions; None if geometry fails.
+    def around(self, box: FreeBox) -> FreeBox | None:
+        """A box with the free positions that are connected to its own; None if geometry fails.
 
         On a large floor only the part near the box is looked at: the result is smaller, but as free.
         """
@@ -176,16 +166,16 @@ class Regions:
         if full is None:
             return None
         if self._margin == 0.0:
-            return Box(box.intervals, full, full)
+            return _filled(box, full, full)
         if self._narrow is not None:
             core = _joined(self._cells(self._core, self._narrow, box), box)
         else:
             section = FreeSpace(full.rings).minus(disc_polygon(self._margin))
             core = _joined(regions_of(section, over=False), box)
-        return None if core is None else Box(box.intervals, full, core)
+        return None if core is None else _filled(box, full, core)
 
     def _cells(
-        self, maker: CellMaker | None, floor: Polygon | MultiPolygon, box: PathBox
+        self, maker: CellMaker | None, floor: Polygon | MultiPolygon, box: FreeBox
     ) -> Sequence[Region]:
         if maker is None:
             near = nearby(floor, box.positions, self._swept.tree.reach)
@@ -196,9 +186,13 @@ class Regions:
         return CellMaker(self._swept, self._pairs, floor)
 
 
-def _joined(regions: Sequence[Region], box: PathBox) -> Region | None:
+def _joined(regions: Sequence[Region], box: FreeBox) -> Region | None:
     ends = box.positions[[0, -1]]
     return next((region for region in regions if region.depths(ends).min() > 0.0), None)
+
+
+def _filled(box: FreeBox, full: Region, core: Region) -> FreeBox:
+    return replace(box, polygon=to_polygon(full.section), core=to_polygon(core.section))
 
 
 def unwrapped(
@@ -224,7 +218,7 @@ def unwrapped(
 
 
 def make_channel(
-    problem: PlanningProblem, boxes: Sequence[Box], margin: float, path: FloatArray | None
+    problem: PlanningProblem, boxes: Sequence[FreeBox], margin: float, path: FloatArray | None
 ) -> Channel:
     """Make a channel of free boxes.
 
@@ -237,26 +231,15 @@ def make_channel(
     start = problem.start[2:].tolist()
     turned = unwrapped([box.intervals for box in boxes], start, problem.tree.circular)
     free = tuple(
-        FreeBox(
-            polygon=to_polygon(box.full.section),
-            core=to_polygon(box.core.section),
+        replace(
+            box,
             lower=np.array([lower for lower, _ in angles]),
             upper=np.array([upper for _, upper in angles]),
         )
         for box, angles in zip(boxes, turned, strict=True)
     )
-    end = None if path is not None else end_in(problem, turned[-1], boxes[-1].core)
+    end = None if path is not None else end_in(problem, turned[-1], BoundaryDistance(free[-1].core))
     asked = problem if end is None else ending_at(problem, end)
     middle = 0.5 * (free[-1].lower[0] + free[-1].upper[0])
     goal = float(middle + nearest_turn(float(asked.goal_pose[2]) - middle))
     return Channel(free, margin, goal, path, end=end)
-
-
-def explored_channel(problem: PlanningProblem, boxes: Sequence[tuple[Intervals, Region]]) -> Channel:
-    """The channel of boxes that an exploration found at margin zero.
-
-    Args:
-        problem: The question.
-        boxes: Expanded intervals and region of every box.
-    """
-    return make_channel(problem, [Box(*box, core=box[1]) for box in boxes], 0.0, None)

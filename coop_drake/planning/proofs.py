@@ -20,8 +20,7 @@ from coop_drake.errors import GeometryError
 from coop_drake.geometry.convex import normals
 from coop_drake.geometry.minkowski import FreeSpace, to_polygon
 from coop_drake.geometry.piece_sweeps import over_piece
-from coop_drake.geometry.swept_tree import Intervals
-from coop_drake.planning.cells.cells import Region, regions_of
+from coop_drake.planning.cells.cells import FreeBox, regions_of
 from coop_drake.planning.cells.exploration import Exploration, ExplorationResult, Verdict, Watch
 from coop_drake.planning.certificates import LEAST_LOSS, Witnesses, disc_proof, slices_proof
 from coop_drake.planning.questions import ARC_SEGMENTS, inscribed_disc, marginal_workspace, relaxed, shrunk
@@ -240,8 +239,8 @@ class Proofs:
             outcome = replace(outcome, verdict=Verdict.RESOLUTION)
         self._outcomes[chosen] = outcome
 
-    def boxes(self) -> list[tuple[Intervals, Region]]:
-        """Expanded intervals and regions of the whole question's free channel."""
+    def boxes(self) -> list[FreeBox]:
+        """The boxes of the whole question's free channel."""
         return self._exploration(self._all).boxes(self._outcomes[self._all].path)
 
     def undecided(self) -> tuple[MixedCell, ...]:

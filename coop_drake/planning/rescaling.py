@@ -17,9 +17,9 @@ from coop_drake.answers.plan import Cell, Plan
 from coop_drake.answers.problem import PlannerSettings, PlanningProblem
 from coop_drake.answers.proof import Cut, InfeasibilityProof, OverCell, OverSlice
 from coop_drake.laws.gains import FixedGains, GainSet
-from coop_drake.planning.cells.cells import Region
+from coop_drake.planning.cells.cells import FreeBox, Region
 from coop_drake.planning.cells.exploration import ChannelSearched, Event, SeenCell, SliceAdded, Watch
-from coop_drake.planning.channel import Channel, CoveredPath, FreeBox, NoChannel
+from coop_drake.planning.channel import Channel, CoveredPath, NoChannel
 from coop_drake.planning.questions import SMALLEST_MARGIN
 from coop_drake.tree.component_tree import Component, ComponentTree, ConvexShape
 from coop_drake.tree.pose import FloatArray, PlanarPose
@@ -127,7 +127,8 @@ class Rescaling:
         return CoveredPath(path, margin, lambda: self._channel(found.channel()), another)
 
     def _channel(self, found: Channel) -> Channel:
-        boxes = tuple(self._scaled_box(box, self._units[2:], "polygon", "core") for box in found.boxes)
+        scaled = (self._scaled_box(box, self._units[2:], "polygon", "core") for box in found.boxes)
+        boxes = tuple(replace(box, positions=self.unit * box.positions) for box in scaled)
         path = None if found.path is None else found.path * self._units
         ends = None if found.ends is None else found.ends * self.unit
         end = None if found.end is None else found.end * self._units

@@ -14,7 +14,8 @@ from coop_drake.answers.problem import PlanningProblem, at_goal, goal_box
 from coop_drake.errors import GeometryError
 from coop_drake.geometry.body_pairs import BodyPairs
 from coop_drake.geometry.swept_tree import SweptTree
-from coop_drake.planning.boxes import Certifier, PathBox
+from coop_drake.planning.boxes import Certifier
+from coop_drake.planning.cells.cells import FreeBox
 from coop_drake.planning.channel import Channel, CoveredPath, Regions, make_channel
 from coop_drake.planning.questions import (
     ending_at,
@@ -62,7 +63,7 @@ class BoxSequence:
         margin: The margin that the path's positions keep in every box [m].
     """
 
-    boxes: tuple[PathBox, ...]
+    boxes: tuple[FreeBox, ...]
     path: FloatArray
     margin: float
 

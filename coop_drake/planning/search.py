@@ -13,27 +13,26 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import suppress
+from dataclasses import replace
 from time import thread_time
 
 from shapely.errors import ShapelyError
 
 from coop_drake.answers.problem import PlanningProblem
 from coop_drake.answers.search_report import SearchReport
-from coop_drake.errors import GeometryError, PatienceError
+from coop_drake.errors import GeometryError, PatienceError, PlanError
 from coop_drake.geometry.body_pairs import BodyPairs
-from coop_drake.geometry.safeguards import shared
-from coop_drake.geometry.swept_tree import Intervals, SweptTree
+from coop_drake.geometry.minkowski import to_polygon
+from coop_drake.geometry.swept_tree import SweptTree
 from coop_drake.planning.blocked_goal import blocked_goal, touch_at_goal
 from coop_drake.planning.cells.as_printed import PaperExploration
-from coop_drake.planning.cells.cells import CellMaker, Region
+from coop_drake.planning.cells.cells import CellMaker, FreeBox
 from coop_drake.planning.cells.exploration import Exploration, ExplorationResult, Subdivision, Verdict, Watch
 from coop_drake.planning.certificates import Witnesses, slices_proof
 from coop_drake.planning.channel import (
-    Box,
     Channel,
     CoveredPath,
     NoChannel,
-    explored_channel,
     make_channel,
     middle_of,
 )
@@ -82,7 +81,7 @@ def search_by_cells(
         if found.verdict is Verdict.FOUND:
             boxes = _boxes_at_margin(problem, wider.boxes(found.path))
             return make_channel(problem, boxes, margin, None), SearchReport(slices)
-    return explored_channel(problem, exploration.boxes(outcome.path)), SearchReport(slices)
+    return make_channel(problem, exploration.boxes(outcome.path), 0.0, None), SearchReport(slices)
 
 
 def _explored_at(
@@ -106,21 +105,16 @@ def _exploration(problem: PlanningProblem, margin: float, watch: Watch | None) -
     return Exploration(problem, workspace, watch, words)
 
 
-def _boxes_at_margin(problem: PlanningProblem, found: list[tuple[Intervals, Region]]) -> list[Box]:
+def _boxes_at_margin(problem: PlanningProblem, found: list[FreeBox]) -> list[FreeBox]:
     """Boxes whose cores were found at a margin, with the positions around them that are free without it."""
     swept = SweptTree(problem.tree)
     maker = CellMaker(swept, BodyPairs(swept), problem.workspace)
-    return [
-        Box(
-            intervals,
-            max(
-                maker.under_cells(intervals),
-                key=lambda full: shared(full.section, core.section, over=False).area(),
-            ),
-            core,
-        )
-        for intervals, core in found
-    ]
+
+    def around(box: FreeBox) -> FreeBox:
+        regions = (to_polygon(region.section) for region in maker.under_cells(box.intervals))
+        return replace(box, polygon=max(regions, key=lambda full: full.intersection(box.core).area))
+
+    return list(map(around, found))
 
 
 def _no_channel(problem: PlanningProblem, exploration: Subdivision, outcome: ExplorationResult) -> NoChannel:
@@ -307,7 +301,7 @@ class _Search:
                 return NoChannel(True, refutation.reason, refutation.proof)
             if verdict is Verdict.FOUND:
                 self._first_plan = thread_time() - self._began
-                return self._around(explored_channel(self._problem, self._proofs.boxes()))
+                return self._around(make_channel(self._problem, self._proofs.boxes(), 0.0, None))
             found = self._first_of(attempts)
             if found is None and 0 < self._narrow_attempts < NARROW_ATTEMPTS:
                 found = self._narrow_sampled()
@@ -352,7 +346,7 @@ class _Search:
 
     def _around(self, channel: Channel) -> CoveredPath | Channel:
         """A sampled path around a channel if one is found: slices leave narrower passages free."""
-        with suppress(GeometryError, ShapelyError):
+        with suppress(GeometryError, PlanError, ShapelyError):
             found = self._samples.around(middle_of(channel, self._problem.start))
             return channel if found is None else self._with_margin(found)
         return channel

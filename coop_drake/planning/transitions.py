@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
 from math import cos, inf, isfinite, pi, sin, tau
 from typing import Any
 
@@ -17,12 +16,13 @@ from coop_drake.answers.plan import Cell, Plan, Transition
 from coop_drake.answers.problem import PlanningProblem, goal_box
 from coop_drake.errors import GeometryError, PlanError, StallError
 from coop_drake.geometry.boundary import BoundaryDistance
-from coop_drake.geometry.parts import component_at, parts_of
-from coop_drake.geometry.passage import Passage, PassageFinder, pole
+from coop_drake.geometry.parts import component_at
+from coop_drake.geometry.passage import Passage, PassageFinder
 from coop_drake.geometry.tidy import tidy_cell
 from coop_drake.laws import GainSet, ScheduledGains, TransitionGains, transition_gains
-from coop_drake.planning.channel import Channel, FreeBox
-from coop_drake.planning.duration import plan_time, timed, transition_time, travel_time
+from coop_drake.planning.cells.cells import FreeBox
+from coop_drake.planning.channel import Channel, exits
+from coop_drake.planning.duration import plan_time, timed, travel_time
 from coop_drake.planning.limits import (
     GOAL_REGION_FRACTION,
     check_accelerations,
@@ -131,141 +131,20 @@ def check_ends(problem: PlanningProblem, channel: Channel) -> None:
         )
 
 
-# Targets: points in the overlaps of consecutive cores, chosen such that the estimated time is short.
-
-LARGEST_PARTS = 3
-"""Of an overlap in several parts only this many are considered, those with the largest inscribed disc."""
-
-MOST_CANDIDATES = 4
-"""No overlap adopts targets of others beyond so many [-]: in long aisles all overlaps share theirs, and every
-pair costs a search for a passage."""
-
-SHARED_FRACTION = 0.7
-"""A target serves another overlap too if its clearance there is this fraction of the clearance of that
-overlap's own target [-]."""
-
-
-def targets_of(channel: Channel, start: FloatArray, goal: FloatArray) -> tuple[FloatArray, ...]:
-    """Targets chosen for a short time, or where the path of the boxes leaves them; see ``choose_targets``.
-
-    Overlaps that are a tenth of a millimetre wide may have parts that their boxes do not join.
-    """
-    try:
-        return choose_targets(channel, start, goal)
-    except PlanError:
-        if channel.ends is None:
-            raise
-        return (*channel.ends[:-1], goal)
-
-
-def choose_targets(channel: Channel, start: FloatArray, goal: FloatArray) -> tuple[FloatArray, ...]:
-    """Choose a target for every box: poles of inaccessibility of overlapping cores, the last one the goal.
-
-    An overlap may have several parts, and a target may serve several overlaps in a row, in which case only
-    angles move. The sequence of targets with the shortest estimated time is chosen.
-
-    Args:
-        channel: Boxes whose cores overlap.
-        start: Start position, in the first box, shape (2,) [m].
-        goal: Goal position, in the last box, shape (2,) [m].
-
-    Returns:
-        A point for every box, each of shape (2,) [m].
-
-    Raises:
-        PlanError: If consecutive cores do not overlap, or a box does not join its ends.
-    """
-    layers = [[start], *_candidates(channel.boxes), [goal]]
-    times = np.zeros(1)
-    choices = []
-    for index, box in enumerate(channel.boxes):
-        costs = times[:, None] + _crossing_times(box, layers[index], layers[index + 1])
-        if not np.isfinite(costs).any():
-            raise PlanError(f"cell {index}: its entrance and its exit are not connected inside it")
-        choices.append(np.argmin(costs, axis=0))
-        times = costs.min(axis=0)
-    chosen = [0]
-    for choice in reversed(choices[1:]):
-        chosen.append(int(choice[chosen[-1]]))
-    return tuple(layer[k] for layer, k in zip(layers[1:], reversed(chosen), strict=True))
-
-
-def _crossing_times(box: FreeBox, entries: Sequence[FloatArray], exits: Sequence[FloatArray]) -> FloatArray:
-    """Estimated time from every entry to every exit, infinite without a passage, (entries, exits) [s]."""
-    if len(entries) == 1 and len(exits) == 1:
-        return np.zeros((1, 1))
-    finder = PassageFinder(box.polygon)
-
-    def time(entry: FloatArray, exit_: FloatArray) -> float:
-        try:
-            passage = finder.find(entry, exit_)
-        except GeometryError:
-            return float("inf")
-        return transition_time(passage.length, passage.clearance)
-
-    return np.array([[time(entry, exit_) for exit_ in exits] for entry in entries])
-
-
-def _candidates(boxes: Sequence[FreeBox]) -> list[list[FloatArray]]:
-    """For every overlap its own poles, and the poles of neighbouring overlaps that fit into it."""
-    overlaps = [_parts(first, second, index) for index, (first, second) in enumerate(pairwise(boxes))]
-    own = [[pole(part) for part in parts] for parts in overlaps]
-    layers = [[point for point, _ in poles] for poles in own]
-    for order in (range(1, len(overlaps)), range(len(overlaps) - 2, -1, -1)):
-        before = 1 if order.step == -1 else -1
-        for index in order:
-            _adopt(
-                layers[index],
-                layers[index + before],
-                overlaps[index],
-                [clearance for _, clearance in own[index]],
-            )
-    return layers
-
-
-def _adopt(
-    layer: list[FloatArray],
-    others: Sequence[FloatArray],
-    parts: Sequence[Polygon],
-    clearances: Sequence[float],
-) -> None:
-    """Add points of a neighbouring overlap that have enough clearance in one of the parts, up to a number."""
-    for point in others:
-        known = any(np.array_equal(point, mine) for mine in layer)
-        fits = any(
-            BoundaryDistance(part)(point) >= SHARED_FRACTION * clearance
-            for part, clearance in zip(parts, clearances, strict=True)
-        )
-        if fits and not known and len(layer) < MOST_CANDIDATES:
-            layer.append(point)
-
-
-def _parts(first: FreeBox, second: FreeBox, index: int) -> list[Polygon]:
-    """Parts of the overlap of two cores, those with the largest inscribed disc first."""
-    parts = [part for part in parts_of(first.core.intersection(second.core)) if part.area > 0.0]
-    if not parts:
-        raise PlanError(f"cells {index} and {index + 1}: their cores do not overlap")
-    return sorted(parts, key=lambda part: -pole(part)[1])[:LARGEST_PARTS]
-
-
 # A path through the boxes of a channel that was found without one.
 
 
-def path_through(
-    problem: PlanningProblem, channel: Channel, targets: Sequence[FloatArray] | None = None
-) -> FloatArray:
+def path_through(problem: PlanningProblem, channel: Channel) -> FloatArray:
     """A path along the widest passages of a channel's boxes; angles move evenly from overlap to overlap.
 
     Args:
         problem: What was asked.
         channel: The boxes, theta turned to the start.
-        targets: Points at which each box is left, the last one the goal; chosen to be quick if not given.
 
     Returns:
         Free configurations from start to goal, circular axes unwrapped, shape (m, 3 + n).
     """
-    if targets is None:
-        targets = choose_targets(channel, problem.start[:2], problem.goal_pose[:2])
+    targets = (*exits(channel), problem.goal_pose[:2])
     samples, axes = [problem.start], problem.start[2:]
     entries = (problem.start[:2], *targets[:-1])
     for index, (box, entry, target) in enumerate(zip(channel.boxes, entries, targets, strict=True)):
@@ -309,7 +188,7 @@ def make_plan(
         channel: Free boxes from start to goal.
         gain_set: Gains, fixed or to be scheduled.
         gain_set_name: Name under which the scenario knows them.
-        targets: Points at which each box is left, the last one the goal; chosen if not given.
+        targets: Points at which each box is left, the last one the goal; by default as ``exits`` has them.
         progress: Called with a phase and the fraction of it that is done.
 
     Raises:
@@ -320,7 +199,7 @@ def make_plan(
     start, goal = problem.start[:2], problem.goal_pose[:2]
     check_ends(problem, channel)
     if targets is None:
-        targets = targets_of(channel, start, goal)
+        targets = (*exits(channel), goal)
     entries = (start, *targets[:-1])
     cells = []
     for index, (box, entry, target) in enumerate(zip(channel.boxes, entries, targets, strict=True)):

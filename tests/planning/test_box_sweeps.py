@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from coop_drake.geometry.body_pairs import BodyPairs
 from coop_drake.geometry.piece_sweeps import over_piece
 from coop_drake.geometry.swept_tree import SweptTree
-from coop_drake.planning.boxes import bodies_apart, box_arrays, room_for_sweeps, swept_piece
+from coop_drake.planning.boxes import box_arrays, room_for_sweeps, sweeps_apart, swept_piece
 from tests.support.trees import slices_of, trees
 
 SOME = settings(max_examples=25)
@@ -30,4 +30,4 @@ def test_sweeps_are_those_of_each_piece_and_bodies_touch_where_pairs_do(data: st
     for k, (piece, stages) in enumerate(boxes.pair_sweeps.tolist()):
         kept = vertices[sweeps.first[k] : sweeps.first[k + 1]]
         assert (kept == over_piece(boxes.team, piece, lower, upper, stages, False)).all()
-    assert bodies_apart(boxes, sweeps, vertices) == (pairs.touching(intervals) is None)
+    assert sweeps_apart(boxes, sweeps, vertices) == (pairs.touching(intervals) is None)

@@ -6,7 +6,7 @@ import pytest
 
 from coop_drake.planning.cells.exploration import Exploration, Verdict
 from coop_drake.planning.cells.graph import CellGraph, Kind
-from coop_drake.planning.channel import explored_channel
+from coop_drake.planning.channel import make_channel
 from coop_drake.planning.questions import relaxed
 from tests.planning.test_search import rod_problem
 from tests.support.cases import case
@@ -22,7 +22,7 @@ def test_exploration_alone_finds_a_sound_channel() -> None:
     for one, other in pairwise(outcome.path):
         assert other.slice in exploration.slices.all[one.slice].neighbours
         assert one.region.meets(other.region)
-    channel = explored_channel(problem, exploration.boxes(outcome.path))
+    channel = make_channel(problem, exploration.boxes(outcome.path), 0.0, None)
     assert_channel_is_sound(problem, channel)
 
 

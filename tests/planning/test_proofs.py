@@ -101,7 +101,7 @@ def test_runs_go_on_where_they_stopped() -> None:
     for share in (10, 40, 800):
         verdict = stepped.run(share)
     assert verdict is Verdict.FOUND
-    assert [intervals for intervals, _ in stepped.boxes()] == [intervals for intervals, _ in alone.boxes()]
+    assert [box.intervals for box in stepped.boxes()] == [box.intervals for box in alone.boxes()]
 
 
 def test_a_disc_that_cannot_pass_refutes_at_once() -> None:

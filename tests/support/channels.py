@@ -4,7 +4,8 @@ import numpy as np
 from shapely import Point, Polygon, box, union_all
 
 from coop_drake.geometry import pole
-from coop_drake.planning.channel import Channel, FreeBox
+from coop_drake.planning.cells.cells import FreeBox
+from coop_drake.planning.channel import Channel
 from tests.support.cases import case
 
 MARGIN = 0.05

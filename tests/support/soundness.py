@@ -7,7 +7,8 @@ import shapely
 from shapely import Point, maximum_inscribed_circle
 
 from coop_drake.answers.problem import PlanningProblem
-from coop_drake.planning.channel import Channel, FreeBox
+from coop_drake.planning.cells.cells import FreeBox
+from coop_drake.planning.channel import Channel
 from coop_drake.planning.transitions import goal_values
 from tests.support.free_positions import FreePositions
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import NamedTuple
 
@@ -229,10 +229,11 @@ class Region:
 
     def depths(self, points: FloatArray) -> FloatArray:
         """Signed distances from the boundary, positive inside (even-odd rule); shape (k, 2) to (k,) [m]."""
-        return self._boundary.batch(points)
+        return self.boundary.batch(points)
 
     @cached_property
-    def _boundary(self) -> BoundaryDistance:
+    def boundary(self) -> BoundaryDistance:
+        """Signed distance from its boundary."""
         return BoundaryDistance(to_polygon(self.section))
 
     def meets(self, other: Region, *, otherwise: bool = True) -> bool:
@@ -241,6 +242,40 @@ class Region:
         if a[0] > b[2] or b[0] > a[2] or a[1] > b[3] or b[1] > a[3]:
             return False
         return meet(self.section, other.section, otherwise=otherwise)
+
+
+@dataclass(frozen=True, eq=False)
+class FreeBox:
+    """A set of configurations proved free: every position in ``polygon`` with every angle in the intervals.
+
+    Attributes:
+        polygon: Positions p_WL, one connected component of the under-approximation at margin zero [m]; empty
+            while only the positions of a path are known.
+        core: The positions that keep the plan's margin, one connected component; a subset of ``polygon`` [m].
+        lower: Lower ends of (theta, q...), expanded by the overlap, circular axes unwrapped, shape
+            (1 + n,) [rad, m].
+        upper: Upper ends, shape (1 + n,).
+        positions: Where a path passes the box: its team is free at every point of the polyline through them,
+            for all angles in the intervals, shape (k, 2) [m]; no rows of a box that was found without a path.
+    """
+
+    polygon: Polygon
+    core: Polygon
+    lower: FloatArray
+    upper: FloatArray
+    positions: FloatArray = field(default_factory=lambda: np.empty((0, 2)))
+
+    @property
+    def intervals(self) -> Intervals:
+        """Interval of every axis (theta, q...)."""
+        return tuple(zip(self.lower.tolist(), self.upper.tolist(), strict=True))
+
+    @classmethod
+    def of(cls, intervals: Intervals, region: Region) -> FreeBox:
+        """A box of some intervals whose positions are those of a region, at no margin."""
+        lower, upper = np.array(intervals).T.copy()
+        polygon = to_polygon(region.section)
+        return cls(polygon, polygon, lower, upper)
 
 
 class CellMaker:
@@ -412,18 +447,18 @@ _END_FAN = (
 """Positions within a tolerance of 1 that are tried, shape (48, 2) [-]."""
 
 
-def end_in(problem: PlanningProblem, intervals: Intervals, region: Region) -> FloatArray | None:
+def end_in(problem: PlanningProblem, intervals: Intervals, boundary: BoundaryDistance) -> FloatArray | None:
     """A configuration of the goal in a cell that is free, its middle if possible; None if there is no room.
 
     Args:
         problem: The question.
         intervals: The cell's intervals of (theta, q...).
-        region: Its positions.
+        boundary: Distance from the boundary of its positions.
 
     Returns:
         z, theta as in the intervals, joints without a goal in the middle of theirs, shape (3 + n,) [m, rad].
     """
-    place, values = _place_in(problem, region), list[float]()
+    place, values = _place_in(problem, boundary), list[float]()
     goals, circular = (float(problem.goal_pose[2]), *problem.goal_joints), problem.tree.circular
     for (a, b), (low, high), goal, periodic in zip(
         intervals, goal_box(problem), goals, circular, strict=True
@@ -441,14 +476,15 @@ def end_in(problem: PlanningProblem, intervals: Intervals, region: Region) -> Fl
     return None if place is None or len(values) < len(intervals) else np.array([*place, *values])
 
 
-def _place_in(problem: PlanningProblem, region: Region) -> FloatArray | None:
-    """The goal's position if a region holds it, else the one within the tolerance that has the most room."""
+def _place_in(problem: PlanningProblem, boundary: BoundaryDistance) -> FloatArray | None:
+    """The goal's position if it is held, else the one within the tolerance that has the most room."""
     goal, room = problem.goal_pose[:2], problem.position_tolerance
-    if region.holds(goal):
+    depth = float(boundary.batch(goal[None])[0])
+    if depth > 0.0:
         return goal
-    if not region.near(goal, room):
+    if depth < -room:
         return None
     places = goal + room * _END_FAN
-    left = np.minimum(region.depths(places), room - np.hypot(*(places - goal).T))
+    left = np.minimum(boundary.batch(places), room - np.hypot(*(places - goal).T))
     best = int(np.argmax(left))
     return places[best] if left[best] >= LEAST_END_SHARE * room else None

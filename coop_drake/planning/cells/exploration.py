@@ -15,7 +15,7 @@ from coop_drake.answers.problem import PlanningProblem, goal_box
 from coop_drake.geometry.body_pairs import BodyPairs
 from coop_drake.geometry.minkowski import to_polygon
 from coop_drake.geometry.swept_tree import Intervals, SweptTree
-from coop_drake.planning.cells.cells import CellMaker, Region, end_in
+from coop_drake.planning.cells.cells import CellMaker, FreeBox, Region, end_in
 from coop_drake.planning.cells.graph import CellGraph, GraphCell, Kind
 from coop_drake.planning.cells.slices import Slices, holds, meets
 from coop_drake.planning.cells.splitting import SplitOrder, finest_widths
@@ -232,9 +232,10 @@ class Subdivision(ABC):
     def over_leaves(self) -> dict[int, list[Region]]:
         """Over-cells of every leaf by its id; an empty list where the whole leaf is blocked."""
 
-    def boxes(self, path: Sequence[GraphCell]) -> list[tuple[Intervals, Region]]:
-        """Expanded intervals and region of every cell of a free path."""
-        return [(self.slices.expanded(self.slices.all[cell.slice].intervals), cell.region) for cell in path]
+    def boxes(self, path: Sequence[GraphCell]) -> list[FreeBox]:
+        """The boxes of a free path: its cells with the expanded intervals of their slices."""
+        expanded = (self.slices.expanded(self.slices.all[cell.slice].intervals) for cell in path)
+        return [FreeBox.of(intervals, cell.region) for intervals, cell in zip(expanded, path, strict=True)]
 
     def undecided(self, path: Sequence[GraphCell]) -> tuple[MixedCell, ...]:
         """Cells of a path that are not proved free, the widest first."""
@@ -353,7 +354,8 @@ class Exploration(Subdivision):
             ends += [
                 c.index
                 for c in free
-                if c.region.holds(goal[:2]) or (blocked and end_in(problem, expanded, c.region) is not None)
+                if c.region.holds(goal[:2])
+                or (blocked and end_in(problem, expanded, c.region.boundary) is not None)
             ]
         self._goals[index] = ends
 
