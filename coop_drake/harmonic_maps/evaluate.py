@@ -17,7 +17,7 @@ import numpy as np
 
 from coop_drake.compiled import compiled
 from coop_drake.geometry.distances import nearest_fraction, ray_crosses
-from coop_drake.harmonic_maps.panels import gauss_nodes
+from coop_drake.harmonic_maps.panels import gauss_nodes, point_distance
 from coop_drake.tree.pose import FloatArray, IntArray
 
 REFINED_NODES = 20
@@ -32,10 +32,12 @@ ON_BOUNDARY, INSIDE, OUTSIDE = 0, 1, 2
 _QUADRATURE = 2.9
 """|zeta - 1| + |zeta + 1| below which the Gauss nodes are too few and the Legendre functions are needed
 [-]."""
+FAR = 2.2
+"""|zeta| from which the solved nodes of a panel are enough to integrate over it [-]."""
 _JUNCTION = 1e-6
 """The Jacobian is taken no closer than this to where two panels meet, where it has a logarithm [half
 panels]."""
-GAUSS_X, GAUSS_W = gauss_nodes(REFINED_NODES)
+_GAUSS_X, _GAUSS_W = gauss_nodes(REFINED_NODES)
 
 FlatMap = FloatArray
 """A map in one array of floats: the centre (x, y) and the rounding [m]; for every array of `MapArrays` where
@@ -185,7 +187,7 @@ def _add(a: Sums, b: Sums) -> Sums:
 
 
 @compiled(reassociate=True)
-def density_of(m: FlatMap, k: int, place: int, level: int) -> int:
+def _density_of(m: FlatMap, k: int, place: int, level: int) -> int:
     """Where the density of panel (k, place, level) stands: values, then Legendre coefficients."""
     index = place
     if k >= 0:
@@ -228,7 +230,7 @@ def _panel_sums(
     Neighbours that share an end to the last bit never miss or count twice a point between them.
     """
     ax, ay, bx, by = panel_ends(m, k, place, level, x, y, rx, ry)
-    density = density_of(m, k, place, level)
+    density = _density_of(m, k, place, level)
     hx, hy = 0.5 * (bx - ax), 0.5 * (by - ay)
     squared = hx * hx + hy * hy
     # zeta + 1 and zeta - 1.
@@ -265,10 +267,10 @@ def _gauss(m: FlatMap, values: int, zx: float, zy: float) -> tuple[float, float,
     """Imaginary parts of the two integrals, real and imaginary parts of their derivatives, by quadrature."""
     tu, tv, ru, iu, rv, iv = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for j in range(REFINED_NODES):
-        rx = GAUSS_X[j] - zx
+        rx = _GAUSS_X[j] - zx
         inverse = 1.0 / (rx * rx + zy * zy)
         re, im = rx * inverse, zy * inverse
-        u, v = GAUSS_W[j] * m[values + 2 * j], GAUSS_W[j] * m[values + 2 * j + 1]
+        u, v = _GAUSS_W[j] * m[values + 2 * j], _GAUSS_W[j] * m[values + 2 * j + 1]
         re2, im2 = re * re - im * im, 2.0 * re * im
         tu += u * im
         tv += v * im
@@ -359,6 +361,93 @@ def _corner_sums(m: FlatMap, k: int, level: int, x: float, y: float, rounding: f
         scale *= 0.5
         level += 1
     return _add(total, _tail(m, k, level, rx, ry))
+
+
+@compiled(reassociate=True)
+def seen_from(m: FlatMap, k: int, place: int, level: int, x: float, y: float) -> tuple[float, float, float]:
+    """How a source is seen from a point [m].
+
+    Returns:
+        Its distance; the distance of a panel's middle or of a corner's vertex; the half length of a panel or
+        the length of a corner's legs, all [m].
+    """
+    corner = row(m, CORNERS, max(k, 0), 15)
+    rx, ry = x - m[corner], y - m[corner + 1]
+    if place >= 0:
+        ax, ay, bx, by = panel_ends(m, k, place, level, x, y, rx, ry)
+        middle = 0.5 * np.sqrt((ax + bx) ** 2 + (ay + by) ** 2)
+        half = 0.5 * np.sqrt((bx - ax) ** 2 + (by - ay) ** 2)
+        return point_distance(0.0, 0.0, ax, ay, bx, by), middle, half
+    leg, nearest = m[corner + 8] * 0.5**level, np.inf
+    for side in range(2):
+        ax, ay = leg * m[corner + 2 + 2 * side] - rx, leg * m[corner + 3 + 2 * side] - ry
+        nearest = min(nearest, point_distance(0.0, 0.0, ax, ay, -rx, -ry))
+    return nearest, np.sqrt(rx * rx + ry * ry), leg
+
+
+@compiled(reassociate=True)
+def solved_nodes(m: FlatMap, k: int, place: int) -> tuple[int, int]:
+    """Index range [first, end) of the solved nodes of a regular panel or of a corner's block."""
+    if k >= 0:
+        return integer(m, CORNER_INDEX, k, 7, 0), integer(m, CORNER_INDEX, k + 1, 7, 0)
+    regular = integer(m, CORNER_INDEX, rows_of(m, CORNERS), 7, 0)
+    count = (_row_length(m) - regular) // rows_of(m, PANELS)
+    return regular + place * count, regular + (place + 1) * count
+
+
+@compiled(reassociate=True)
+def _row_length(m: FlatMap) -> int:
+    """Number of solved nodes: the length of each of the six rows of sources."""
+    return (row(m, CORNERS, 0, 15) - row(m, SOURCES, 0, 0)) // 6
+
+
+@compiled(reassociate=True)
+def gather(
+    m: FlatMap, k: int, place: int, level: int, opened: bool, seen: tuple[float, float, float],
+    x: float, y: float, radius: float, nodes: FloatArray,
+) -> int:  # fmt: skip
+    """Write the nodes of a source that is far from a box; return how many.
+
+    The source is ``seen`` from the box's centre (x, y) [m]; ``radius`` is the half diagonal of the box [m],
+    ``opened`` whether refined densities are known. The nodes are columns (position seen from the centre, line
+    element, mu_u, mu_v), shape (6, .).
+    """
+    if (place < 0 and level == 0) or (k < 0 and (not opened or seen[1] - radius >= FAR * seen[2])):
+        first, last = solved_nodes(m, k, place)
+        sources, n = row(m, SOURCES, 0, 0), _row_length(m)
+        for j in range(first, last):
+            for i in range(6):
+                nodes[i, j - first] = m[sources + i * n + j]
+            nodes[0, j - first] -= x
+            nodes[1, j - first] -= y
+        return int(last - first)
+    corner = row(m, CORNERS, max(k, 0), 15)
+    if place < 0:
+        return _gather_tail(m, k, level, m[corner] - x, m[corner + 1] - y, nodes)
+    ax, ay, bx, by = panel_ends(m, k, place, level, x, y, x - m[corner], y - m[corner + 1])
+    density = _density_of(m, k, place, level)
+    hx, hy = 0.5 * (bx - ax), 0.5 * (by - ay)
+    for j in range(REFINED_NODES):
+        nodes[0, j], nodes[1, j] = 0.5 * (ax + bx) + _GAUSS_X[j] * hx, 0.5 * (ay + by) + _GAUSS_X[j] * hy
+        nodes[2, j], nodes[3, j] = _GAUSS_W[j] * hx, _GAUSS_W[j] * hy
+        nodes[4, j], nodes[5, j] = m[density + 2 * j], m[density + 2 * j + 1]
+    return REFINED_NODES
+
+
+@compiled(reassociate=True)
+def _gather_tail(m: FlatMap, k: int, level: int, x: float, y: float, nodes: FloatArray) -> int:
+    """Write the nodes of a corner's compressed density at a level, its vertex at (x, y); return how many."""
+    n, grid = integer(m, CORNER_INDEX, k, 7, 2), row(m, GRID, integer(m, CORNER_INDEX, k, 7, 3), 2)
+    tail, corner = row(m, TAILS, integer(m, CORNER_INDEX, k, 7, 6) + 2 * level * n, 2), row(m, CORNERS, k, 15)
+    scale = m[corner + 8] * 0.5**level
+    for i in range(2 * n):
+        leg, j = i // n, i % n
+        dx, dy = scale * m[corner + 2 + 2 * leg], scale * m[corner + 3 + 2 * leg]
+        s, w = m[grid + 2 * j], (2.0 * leg - 1.0) * m[grid + 2 * j + 1]
+        nodes[0, i], nodes[1, i] = x + s * dx, y + s * dy
+        nodes[2, i], nodes[3, i] = w * dx, w * dy
+        nodes[4, i], nodes[5, i] = m[tail + 2 * i], m[tail + 2 * i + 1]
+    return 2 * n
 
 
 @compiled(reassociate=True)

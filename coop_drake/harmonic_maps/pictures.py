@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from string import ascii_uppercase
+from typing import Any
 
 import matplotlib as mpl
 import numpy as np
@@ -13,13 +14,12 @@ from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from shapely import LineString, Point
-from shapely.geometry.base import BaseGeometry
 
 from coop_drake.drawing import draw_polygon, new_figure
 from coop_drake.drawing.colours import BLUE, GREEN, GREY, INK, PAPER, VERMILLION, WALL
 from coop_drake.harmonic_maps.harmonic_map import HarmonicMap
-from coop_drake.harmonic_maps.outline import Outline, outline_of
-from coop_drake.tree.pose import FloatArray, IntArray
+from coop_drake.harmonic_maps.outline import outline_of
+from coop_drake.tree.pose import ComplexArray, FloatArray, IntArray
 
 _SIDE = 4.2  # height of a panel [in]
 _FINE = 400  # points on a grid line across the region
@@ -95,15 +95,9 @@ def residual_figure(harmonic_map: HarmonicMap, tolerance: float) -> Figure:
     ax.axhline(bound, color=GREEN, linewidth=1.2, label="estimated largest error")
     for place, letter in _letters(samples):
         ax.axvline(samples.vertex_arc_length[place], color=WALL, linewidth=0.8, zorder=0)
-        ax.annotate(
-            letter,
-            (samples.vertex_arc_length[place], 1.0),
-            xycoords=("data", "axes fraction"),
-            xytext=(0, 2),
-            textcoords="offset points",
-            ha="center",
-            fontweight="bold",
-        )
+        at: dict[str, Any] = {"xycoords": ("data", "axes fraction"), "textcoords": "offset points"}
+        x = samples.vertex_arc_length[place]
+        ax.annotate(letter, (x, 1.0), xytext=(0, 2), ha="center", fontweight="bold", **at)
     ax.grid(visible=False, axis="x")
     ax.set_xlim(0.0, float(samples.arc_length.max()))
     ax.set_ylim(1e-17, 100.0 * max(tolerance, bound))
@@ -142,13 +136,10 @@ def _grid_lines(harmonic_map: HarmonicMap, across: int, lines: int) -> list[Floa
     for value in np.arange(low[across] + 0.5 * spacing, high[across], spacing):
         ends = np.array([low, high])
         ends[:, across] = value
-        parts = _lines(harmonic_map.region.intersection(LineString(ends)))
-        paths.extend(shapely.get_coordinates(part.segmentize(size / _FINE)) for part in parts)
+        parts = shapely.get_parts(harmonic_map.region.intersection(LineString(ends)))
+        found = [part for part in parts if isinstance(part, LineString)]
+        paths.extend(shapely.get_coordinates(line.segmentize(size / _FINE)) for line in found)
     return paths
-
-
-def _lines(shape: BaseGeometry) -> list[LineString]:
-    return [part for part in getattr(shape, "geoms", [shape]) if isinstance(part, LineString)]
 
 
 def _draw_paths(ax: Axes, paths: Sequence[FloatArray], colour: str, width: float) -> None:
@@ -177,6 +168,8 @@ def _draw_letters(cell: Axes, disk: Axes, samples: BoundarySamples) -> None:
     """Letters outside the corners of the outer wall and outside their images; images may coincide."""
     per_edge = len(samples.points) // len(samples.vertices)
     outer = int(np.sum(samples.ring == 0))
+    style: dict[str, Any] = {"textcoords": "offset points", "ha": "center", "va": "center"}
+    style |= {"fontweight": "bold", "zorder": 7}
     images: dict[tuple[float, float], str] = {}
     for place, letter in _letters(samples):
         first, corner = place * per_edge, samples.vertices[place]
@@ -185,25 +178,12 @@ def _draw_letters(cell: Axes, disk: Axes, samples: BoundarySamples) -> None:
         outward = -(along / np.hypot(*along) + back / np.hypot(*back))
         if along[0] * back[1] - along[1] * back[0] < 0.0:  # the corner juts into the region
             outward = -outward
-        _write(cell, letter, corner, 9.0 * outward / max(float(np.hypot(*outward)), 1e-9))
+        cell.annotate(letter, corner, 9.0 * outward / max(float(np.hypot(*outward)), 1e-9), **style)
         x, y = np.round(samples.vertex_images[place], 9).tolist()
         images[x, y] = images.get((x, y), "") + letter
     for (x, y), letters in images.items():
-        point = np.array([x, y])
-        _write(disk, letters, point, (8.0 + 3.0 * len(letters)) * point)
-
-
-def _write(ax: Axes, text: str, place: FloatArray, offset: FloatArray) -> None:
-    ax.annotate(
-        text,
-        (float(place[0]), float(place[1])),
-        xytext=(float(offset[0]), float(offset[1])),
-        textcoords="offset points",
-        ha="center",
-        va="center",
-        fontweight="bold",
-        zorder=7,
-    )
+        reach = 8.0 + 3.0 * len(letters)
+        disk.annotate(letters, (x, y), (reach * x, reach * y), **style)
 
 
 def _letters(samples: BoundarySamples) -> list[tuple[int, str]]:
@@ -246,38 +226,29 @@ class BoundarySamples:
 
 def sample_boundary(harmonic_map: HarmonicMap, per_edge: int = 65) -> BoundarySamples:
     """Sample the boundary, so many times on each edge, more densely towards the corners."""
+
+    def plane(z: ComplexArray) -> FloatArray:
+        return np.column_stack((z.real, z.imag))
+
     outline = outline_of(harmonic_map.region, harmonic_map.target)
-    part = 0.5 - 0.5 * np.cos(np.pi * (np.arange(per_edge) + 0.5) / per_edge)
-    start, side = outline.vertices[:, None], (outline.ends - outline.vertices)[:, None]
-    points = _plane((start + part * side).ravel() + outline.centre)
-    length = np.abs(side[:, 0])
-    before = np.cumsum(length) - length
-    ring = np.repeat(outline.ring, per_edge)
-    images, _ = harmonic_map(points)
-    expected = _expected(outline, ring, part, images)
-    return BoundarySamples(
-        points=points,
-        ring=ring,
-        arc_length=(before[:, None] + part * length[:, None]).ravel(),
-        images=images,
-        expected=expected,
-        vertices=_plane(outline.vertices + outline.centre),
-        vertex_arc_length=before,
-        vertex_images=np.where(
-            (outline.ring == 0)[:, None], _plane(np.exp(1j * outline.angle_start)), expected[::per_edge]
-        ),
-    )
-
-
-def _expected(outline: Outline, ring: IntArray, part: FloatArray, images: FloatArray) -> FloatArray:
-    span = (outline.angle_end - outline.angle_start)[:, None]
-    angle = (outline.angle_start[:, None] + part * span).ravel()
-    expected = _plane(np.exp(1j * angle))
+    # The first column stands for the corner itself.
+    part = np.append(0.0, 0.5 - 0.5 * np.cos(np.pi * (np.arange(per_edge) + 0.5) / per_edge))
+    z = outline.centre + outline.vertices[:, None] + part * (outline.ends - outline.vertices)[:, None]
+    length = np.abs(outline.ends - outline.vertices)
+    along = (np.cumsum(length) - length)[:, None] + part * length[:, None]
+    span = outline.angle_end - outline.angle_start
+    goes_to = np.exp(1j * (outline.angle_start[:, None] + part * span[:, None]))
+    images, _ = harmonic_map(plane(z[:, 1:].ravel()))
     for hole in range(1, outline.holes + 1):
-        expected[ring == hole] = images[ring == hole].mean(axis=0)
-    return expected
-
-
-def _plane(z: np.ndarray) -> FloatArray:
-    """Complex numbers (n,) to points (n, 2)."""
-    return np.column_stack((z.real, z.imag))
+        here = np.repeat(outline.ring == hole, per_edge)
+        goes_to[outline.ring == hole] = images[here].mean(axis=0) @ [1.0, 1.0j]
+    return BoundarySamples(
+        points=plane(z[:, 1:].ravel()),
+        ring=np.repeat(outline.ring, per_edge),
+        arc_length=along[:, 1:].ravel(),
+        images=images,
+        expected=plane(goes_to[:, 1:].ravel()),
+        vertices=plane(z[:, 0]),
+        vertex_arc_length=along[:, 0],
+        vertex_images=plane(goes_to[:, 0]),
+    )

@@ -29,6 +29,7 @@ from typing import NamedTuple
 
 import numpy as np
 import scipy  # It imports its parts when they are first used: maps from the cache need none.
+from numpy.typing import NDArray
 from threadpoolctl import ThreadpoolController  # type: ignore[import-untyped]
 
 from coop_drake.compiled import compiled
@@ -74,7 +75,10 @@ def solve_density(
     """Solve for the density with ``nodes`` Gauss nodes a panel; arguments as in `place_nodes`."""
     grid = place_nodes(outline, panels, angles, nodes, closeness)
     holes, ring = outline.holes, outline.ring[grid.edge]
-    segments = _segments(outline, panels)
+    tangent = (outline.ends - outline.vertices)[panels.edge]
+    tangent = tangent / np.abs(tangent)
+    middle, half = 0.5 * (panels.end + panels.start), 0.5 * (panels.end - panels.start)
+    segments = np.column_stack((outline.vertices[panels.edge] + middle * tangent, half * tangent))
     layer = _double_layer(grid, segments, panels.edge, nodes)
     on_hole = (ring[:, None] == np.arange(1, holes + 1)).astype(float)
     g = grid.boundary_value
@@ -100,15 +104,6 @@ def _atoms(corner_start: IntArray, blocks: list[FloatArray], nodes: int, right: 
         own = np.arange(start, start + nodes)
         atoms.append(_Cluster(own, own, None, right[own]))
     return atoms
-
-
-def _segments(outline: Outline, panels: Panels) -> ComplexArray:
-    """Centre and half vector of each regular panel, shape (panels, 2)."""
-    start = outline.vertices[panels.edge]
-    tangent = (outline.ends - outline.vertices)[panels.edge]
-    tangent = tangent / np.abs(tangent)
-    middle, half = 0.5 * (panels.end + panels.start), 0.5 * (panels.end - panels.start)
-    return np.column_stack((start + middle * tangent, half * tangent))
 
 
 @lru_cache(maxsize=4096)
@@ -211,40 +206,24 @@ def _block(k: _DoubleLayer, rows: IntArray, columns: IntArray, row_of: IntArray)
     return out.T
 
 
-@compiled(reassociate=True)
 def _mark_near(
-    k: _DoubleLayer, own: IntArray, disc: tuple[float, float, float], row_of: IntArray
-) -> tuple[np.ndarray, np.ndarray]:
+    k: _DoubleLayer, own: IntArray, centre: complex, radius: float
+) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
     """Mark the nodes outside a set but not far from it: as sources on the set, and as its targets.
 
-    These are the nodes in a disc (x, y, radius) around the set [m], and those whose entry with a node of the
-    set has exact weights. ``row_of`` is scratch as for `_block`.
-
-    Returns:
-        Masks of shape (n,), False on the set itself.
+    These are the nodes in a disc around the set [m], and those whose entry with a node of the set has exact
+    weights; masks of shape (n,), False on the set itself.
     """
-    n = len(k.x)
-    sources, targets = np.empty(n, dtype=np.bool_), np.empty(n, dtype=np.bool_)
-    for i in range(n):
-        rx, ry = k.x[i] - disc[0], k.y[i] - disc[1]
-        sources[i] = targets[i] = rx * rx + ry * ry < disc[2] * disc[2]
-    for i in own:
-        row_of[i] = 0
+    inside = np.zeros(len(k.x), dtype=np.bool_)
+    inside[own] = True
+    sources = (k.x - centre.real) ** 2 + (k.y - centre.imag) ** 2 < radius * radius
+    targets = sources.copy()
+    panel = np.repeat(np.arange(len(k.pair_start) - 1), np.diff(k.pair_start))
     first, p = k.first[0], k.pair_weight.shape[1]
-    for panel in range(len(k.pair_start) - 1):
-        a, b = first + panel * p, first + (panel + 1) * p
-        holds, struck = False, False
-        for j in range(a, b):
-            holds = holds or row_of[j] >= 0
-        for t in range(k.pair_start[panel], k.pair_start[panel + 1]):
-            struck = struck or row_of[k.pair_target[t]] >= 0
-            if holds:
-                targets[k.pair_target[t]] = True
-        if struck:
-            sources[a:b] = True
-    for i in own:
-        row_of[i] = -1
-        sources[i] = targets[i] = False
+    held: NDArray[np.bool_] = np.any(inside[first:].reshape(-1, p), axis=1)
+    targets[k.pair_target[held[panel]]] = True
+    sources[first:].reshape(-1, p)[panel[inside[k.pair_target]]] = True
+    sources[own] = targets[own] = False
     return sources, targets
 
 
@@ -446,7 +425,7 @@ def _compress(
     x, y = layer.x[own], layer.y[own]
     centre = complex(0.5 * (x.min() + x.max()), 0.5 * (y.min() + y.max()))
     radius = _RADIUS * float(np.hypot(x - centre.real, y - centre.imag).max())
-    sources, targets = _mark_near(layer, own, (centre.real, centre.imag, radius), scratch)
+    sources, targets = _mark_near(layer, own, centre, radius)
     seen = _block(layer, own_rows, columns[sources[columns]], scratch).T
     acted = _block(layer, rows[targets[rows]], own_columns, scratch)
     far_in = _harmonics((layer.x + 1j * layer.y)[own_rows], centre, radius)
