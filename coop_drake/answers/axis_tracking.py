@@ -17,7 +17,13 @@ class AxisTracking:
     Attributes:
         stiffness: K_a [1/s^2].
         damping: zeta_a [1/s].
+        rate: Of every axis (theta, q...) a rate that it never exceeds, nominal rate and departure together,
+            with which an error of the age of measurements counts; empty where no clock is wrong [rad/s or
+            m/s].
+        acceleration: The same of its acceleration [rad/s^2 or m/s^2].
     """
 
     stiffness: _Exact
     damping: _Exact
+    rate: tuple[_Exact, ...] = ()
+    acceleration: tuple[_Exact, ...] = ()

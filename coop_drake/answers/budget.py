@@ -24,7 +24,7 @@ _Exact = Annotated[NotNegative, EXACT]
 
 SCALED = (
     "delay", "lag", "angle_noise", "rate_noise", "position_noise", "velocity_noise", "model_error",
-    "acceleration_error", "axis_error", "report_age", "grasp_noise", "turn_noise",
+    "acceleration_error", "axis_error", "report_age", "clock_error", "grasp_noise", "turn_noise",
 )  # fmt: skip
 """Departures that a budget of the same control rate has more or less of."""
 
@@ -56,6 +56,8 @@ class Budget:
         axis_error: Largest such error of the acceleration of an axis, where the coupling of axes counts, too;
             null for the number of ``acceleration_error`` [rad/s^2 or m/s^2].
         report_age: How long a report of readiness may be used after it was made [s].
+        clock_error: Largest error of a robot's clock; what it accepts by it may be older or younger than
+            ``delay`` by ``age_error`` [s].
         base_force: Largest force that a base is ever told to give, as the length of a vector; null for no
             limit [N].
         base_torque: Largest torque of a base, likewise [N m].
@@ -85,6 +87,7 @@ class Budget:
     acceleration_error: NotNegative = 0.0
     axis_error: NotNegative | None = None
     report_age: NotNegative = 0.0
+    clock_error: NotNegative = 0.0
     base_force: Positive | None = None
     base_torque: Positive | None = None
     joint_effort: Positive | None = None
@@ -139,6 +142,14 @@ class Budget:
     def ahead(self) -> float:
         """How far ahead robots compute efforts from the nominal axes: half a period and the lag [s]."""
         return 0.5 * self.period + self.lag
+
+    @property
+    def age_error(self) -> float:
+        """Largest error of the age of measurements [s].
+
+        A robot accepts ages that seem to be wrong by the error of its clock; this one may hide as much again.
+        """
+        return 2.0 * self.clock_error
 
     @property
     def axis_acceleration_error(self) -> float:

@@ -106,12 +106,13 @@ class LoopDepartures(NamedTuple):
     Attributes:
         times: Control period, longest time of the run, lag of the actuators [s], shape (3,).
         periods: Age of measurements, rows of a line of measurements, periods that a report travels, (3,).
-        seeds: Of every robot and use, see ``seed_of``, shape (N, 7).
+        seeds: Of every robot and use, see ``seed_of``, shape (N, 8).
         probabilities: Of lost and of late measurements, of lost and of repeated reports, shape (4,) [-].
         errors: Standard deviation of the noise, and size, length in periods and phase of the wave of every
             component of a measured pose, then of all measured states, shape (3 + 2 (3 N + n), 4).
         biases: Constant errors of the measured pose, shape (N, 3) [m, rad].
         odometry: Factors of the measured rates of bases, shape (N,) [-].
+        shifts: How much earlier robots measure than they take it for, in periods, shape (N,) [-].
         limits: Largest efforts, of every robot those of ``limit_efforts``, shape (2 N + n,) [N, N m].
         floor: Coulomb friction [N], viscous friction [N s/m], acceleration of gravity along x [m/s^2], (3,).
         friction: Coulomb [N m or N] and viscous friction [N m s or N s/m] of every joint, shape (2,).
@@ -129,6 +130,7 @@ class LoopDepartures(NamedTuple):
     errors: FloatArray
     biases: FloatArray
     odometry: FloatArray
+    shifts: FloatArray
     limits: FloatArray
     floor: FloatArray
     friction: FloatArray
@@ -147,6 +149,8 @@ class LoopMemory(NamedTuple):
         current: Index of the cell [-] and time of its entry [s] as the planner has them, ring (R, 2).
         poses: Measured poses, ring (D, N, 3).
         states: Measured states of all robots, ring (D, 2 (3 N + n)).
+        exact: What there was to measure at the last two samples, by the parity of their numbers: poses, then
+            states, shape (2, 3 N + 2 (3 N + n)).
         lines: Lines of measured poses, then of states, of every robot, shape (N, 2, rows, 1 + size).
         governors: p_G of every robot, shape (N, 2) [m].
         nominal: p^, p^' and p_G, ring (D, 6).
@@ -166,6 +170,7 @@ class LoopMemory(NamedTuple):
     current: FloatArray
     poses: FloatArray
     states: FloatArray
+    exact: FloatArray
     lines: FloatArray
     governors: FloatArray
     nominal: FloatArray

@@ -12,7 +12,7 @@ from coop_drake.compiled_loop.preparing import CompiledTransport
 from coop_drake.diagram.disturbances import blocked_times, downhill, wheel_slips
 from coop_drake.diagram.knowledge import report_periods
 from coop_drake.diagram.radio import seed_of
-from coop_drake.diagram.wrapping import effort_limits, measurement_deviations, measurement_waves
+from coop_drake.diagram.wrapping import clock_shift, effort_limits, measurement_deviations, measurement_waves
 from coop_drake.errors import ScenarioError
 from coop_drake.laws.arrival import mean_samples
 from coop_drake.laws.axis_table import first_jumps
@@ -26,7 +26,7 @@ from coop_drake.systems.departure_monitor import LONG_AGO
 from coop_drake.systems.team_kernels import FusedTeam
 from coop_drake.tree.pose import FloatArray
 
-_USES = 7
+_USES = 8
 """Number of uses of seeds, see ``seed_of``."""
 
 _MOTORS = {"working": 0.0, "held": 1.0, "limp": 2.0}
@@ -91,6 +91,7 @@ def departures_of(transport: CompiledTransport, deployment: Deployment) -> LoopD
         errors=np.concatenate(errors),
         biases=np.array([[own.pose_bias.x, own.pose_bias.y, own.pose_bias.theta] for own in robots]),
         odometry=np.array([1.0 + own.odometry_scale for own in robots]),
+        shifts=np.array([clock_shift(deployment, k) / period for k in range(len(names))]),
         limits=np.concatenate([effort_limits(deployment, n) for n in joints]),
         floor=np.array([floor.coulomb_friction, floor.viscous_friction, downhill(floor.slope)]),
         friction=np.array([deployment.joint_friction.coulomb, deployment.joint_friction.viscous]),
@@ -152,6 +153,7 @@ def memory_of(transport: CompiledTransport, departures: LoopDepartures) -> LoopM
         current=np.zeros((int(departures.hearing[1].max()) + ring, 2)),
         poses=np.zeros((ring, robots, 3)),
         states=np.zeros((ring, states)),
+        exact=np.zeros((2, 3 * robots + states)),
         lines=np.zeros((robots, 2, rows, 1 + widest)),
         governors=np.tile(start[:2], (robots, 1)),
         nominal=np.tile([*start[:2], 0.0, 0.0, *start[:2]], (ring, 1)),

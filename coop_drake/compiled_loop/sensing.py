@@ -7,7 +7,7 @@ import numpy as np
 from coop_drake.compiled import compiled
 from coop_drake.compiled_loop.arrays import LoopDepartures, LoopMemory
 from coop_drake.laws.channels import NOTHING, carry_measurements
-from coop_drake.laws.measurement_errors import write_errors
+from coop_drake.laws.measurement_errors import shift_back, write_errors
 from coop_drake.laws.random_draws import uniform_pair
 from coop_drake.systems.team_kernels import FusedTeam, read_own
 from coop_drake.tree.pose import FloatArray
@@ -41,10 +41,24 @@ def measure(
         read_own(k, team.places, team.first, team.base_chains, team.yaws, memory.state, robot)
         for i in range(size, size + 3):
             robot[i] *= departures.odometry[k]
+        if departures.shifts[k] != 0.0:
+            _shift(sample, 3 * k, departures.shifts[k], pose, memory.exact)
+            _shift(sample, 3 * team.yaws.size + 2 * own, departures.shifts[k], robot, memory.exact)
         _err(departures.seeds[k, POSE_NOISE], number, departures.errors[:3], pose, room)
         begin = 3 + 2 * own
         sizes = departures.errors[begin : begin + robot.size]
         _err(departures.seeds[k, STATE_NOISE], number, sizes, robot, room)
+
+
+@compiled
+def _shift(sample: int, first: int, share: float, values: FloatArray, exact: FloatArray) -> None:
+    """Show what a wrong clock measures, and keep what there is from ``first`` on; see ``shift_back``."""
+    now, before = exact[sample % 2], exact[(sample + 1) % 2]
+    for i in range(values.size):
+        now[first + i] = values[i]
+        if sample == 0:
+            before[first + i] = values[i]
+    shift_back(values, before[first : first + values.size], share)
 
 
 @compiled

@@ -30,7 +30,7 @@ def seed_of(deployment: Deployment, robot: int, use: int = 0) -> int:
     """Return the seed of what is drawn for a robot; each use has its own.
 
     The use is 0 for losses of reports, 1 and 2 for those of measurements of the object and of the robot, 3
-    and 4 for those of messages about holds, 5 and 6 for the noise of these measurements.
+    and 4 for those of messages about holds, 5 and 6 for the noise of these measurements, 7 for the clock.
     """
     words = [deployment.seed, robot, use] if use else [deployment.seed, robot]
     return int(np.random.SeedSequence(words).generate_state(1)[0])

@@ -21,16 +21,27 @@ from pydrake.trajectories import PiecewisePolynomial
 
 from coop_drake.diagram.radio import build_radio, seed_of
 from coop_drake.laws.channels import NOTHING
+from coop_drake.laws.random_draws import uniform_pair
 from coop_drake.laws.sampling import whole_periods
 from coop_drake.scenario import Deafness, Deployment, Messages, PoseBias, RobotDepartures, Silence
-from coop_drake.systems import Interruption, LaggingEffort, LimitedEffort, LossyMeasurement, MeasurementNoise
+from coop_drake.systems import (
+    Interruption,
+    LaggingEffort,
+    LimitedEffort,
+    LossyMeasurement,
+    MeasurementNoise,
+    ShiftedMeasurement,
+)
 from coop_drake.tree.pose import FloatArray
 
-Holding: TypeAlias = DiscreteTimeDelay | ZeroOrderHold | LossyMeasurement
+Holding: TypeAlias = DiscreteTimeDelay | ZeroOrderHold | LossyMeasurement | ShiftedMeasurement
 """Blocks that hold measurements."""
 
 NOISE_USES = {"object_pose": 5, "robot_state": 6}
 """Uses of the seeds of the noise of what is measured, see ``seed_of``."""
+
+CLOCK_USE = 7
+"""Use of the seed of a robot's clock."""
 
 LOSS_USES = {"object_pose": 1, "robot_state": 2}
 """Uses of the seeds of its losses."""
@@ -67,16 +78,24 @@ class Wrapping:
         The time of the measurement goes with it through all that delays or loses it.
         """
         name, size = entry.get_name(), entry.size()
-        joined, parted = Multiplexer([size, 1]), Demultiplexer([size, 1])
+        joined, parted, sensed = Multiplexer([size, 1]), Demultiplexer([size, 1]), self._sensed(name, size)
         carried = [(f"{name}_stamped", joined), *self._carried(name, 1 + size), (f"{name}_parted", parted)]
-        self._lead(entry, self._sensed(name, size) + carried)
+        self._lead(entry, sensed + carried)
         clock = self._builder.AddNamedSystem(f"{name}_clock", TrajectorySource(_CLOCK))
-        self._builder.Connect(clock.get_output_port(0), joined.get_input_port(1))
+        shifted = _affine(np.ones(1), np.array([-clock_shift(self._deployment, self._robot)]))
+        stamp = self._append(clock.get_output_port(0), [(f"{name}_instant", shifted)])
+        self._builder.Connect(stamp, joined.get_input_port(1))
         return parted.get_output_port(1)
 
     def _sensed(self, name: str, size: int) -> list[tuple[str, LeafSystem]]:
         """Return the blocks of a measurement's errors."""
-        period, blocks = self._deployment.period, [(f"{name}_biased", _distortion(self._own, name, size))]
+        period, shift = self._deployment.period, clock_shift(self._deployment, self._robot)
+        blocks: list[tuple[str, LeafSystem | None]]
+        blocks = [(f"{name}_biased", _distortion(self._own, name, size))]
+        if period is not None and shift:
+            shifted = ShiftedMeasurement(size, shift / period, period, self._own.sample_offset)
+            blocks.append((f"{name}_shifted", shifted))
+            self.delays.append(shifted)
         if period is not None:
             blocks.append((f"{name}_measured", self._noise(name, size, period)))
         return [(label, block) for label, block in blocks if block is not None]
@@ -225,6 +244,18 @@ class Wrapping:
             offset=self._own.sample_offset,
             before=before,
         )
+
+
+def clock_shift(deployment: Deployment, robot: int) -> float:
+    """Return by how much earlier a robot's sensors measure than it takes them to [s]; negative for later.
+
+    It is drawn once for the run. Nothing is measured later than it is used.
+    """
+    most = deployment.clock_error
+    if not most:
+        return 0.0
+    drawn = uniform_pair(seed_of(deployment, robot, CLOCK_USE), 0)[0]
+    return max((2.0 * drawn - 1.0) * most, -deployment.whole_delay)
 
 
 def measurement_deviations(deployment: Deployment, name: str, size: int) -> FloatArray:

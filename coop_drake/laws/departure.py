@@ -6,12 +6,13 @@ above which something is wrong that the budget does not count. While no robot me
 by more than a + n_2, n_2 being the noise that is left where all robots judge: for what they all measure, that
 of their mean. So it was when the measurements were made. Until a report is used that rests on them, the time
 
-    t = delay + report_age + T
+    t = delay + s + report_age + T
 
-passes, in which a departure whose rate the noise of rates hides grows by at most n_v t + w t^2 / 2. The plan
-leaves room for all of it: the strip between the governed sets and their cells is at least a + n_2 + growth
-wide, and the level of an axis is never more than what its nominal distance d^ to its funnel's bounds leaves,
-min(a, d^ - n_2 - growth).
+passes, s being by how much the age of measurements may be wrong, in which a departure whose rate the noise of
+rates hides grows by at most n_v t + w t^2 / 2. The plan leaves room for all of it: the strip between the
+governed sets and their cells is at least a + n_2 + growth wide, and the level of an axis is never more than
+what its nominal distance d^ to its funnel's bounds leaves, min(a, d^ - n_2 - growth). With a wrong age, n_1
+and n_2 hold s times the largest rate, too, for rates s times the largest acceleration.
 
 The measurements are raw ones, before predictor, observer and averages, and are compared with the nominal
 state of the instant at which they were made. The pose of a robot's base is compared with that which the
@@ -45,15 +46,16 @@ NAMES = ("the object's position", "the object's velocity", "its grasp", "the ang
 """What they are levels of."""
 
 
-def unseen_time(delay: float, report_age: float, period: float) -> float:
+def unseen_time(delay: float, report_age: float, period: float, age_error: float) -> float:
     """Return t, how long a departure may grow until a report is used no more that does not know of it [s].
 
     Args:
         delay: Age of the measurements [s].
         report_age: How long a report may be used [s].
         period: T [s].
+        age_error: By how much older the measurements may be [s].
     """
-    return (whole_periods(delay, period) + whole_periods(report_age, period) + 1) * period
+    return (whole_periods(delay, period) + whole_periods(report_age, period) + 1) * period + age_error
 
 
 def growth(rate_noise: float, error: float, time: float) -> float:

@@ -41,3 +41,19 @@ def write_errors(
         errors[i] *= deviations[i]
         if waves[i, 0] != 0.0:
             errors[i] += square_wave(number, waves[i, 0], waves[i, 1], waves[i, 2])
+
+
+@compiled
+def shift_back(values: FloatArray, before: FloatArray, share: float) -> None:
+    """Replace what is measured by what it was a part of a period earlier, or will be later.
+
+    Between two samples, and as much beyond, motions are taken for uniform, so that nothing is shifted by more
+    than the shift times the largest rate in this period.
+
+    Args:
+        values: What there is to measure at a sample, shape (n,).
+        before: What there was at the one before, shape (n,).
+        share: How much earlier, in periods; may be negative [-].
+    """
+    for i in range(values.size):
+        values[i] -= share * (values[i] - before[i])

@@ -165,6 +165,17 @@ class RobotNode:
         """Tell the supervisor again what holds: it may be another process, which has heard nothing yet."""
         self._said, self._reported, self._told_rest = Ready(self.place.cell, False), inf, -inf
 
+    def instant(self, time: float, sample: int) -> float:
+        """Return the time for which the robot computes a sample [s].
+
+        Nominal motions must be the same in all robots, whatever their clocks show: they count samples.
+
+        Args:
+            time: What the robot's clock shows [s].
+            sample: Number of the sample.
+        """
+        return time if self._plan.budget is None else sample * self.period
+
     def look(self, time: float, measured: FloatArray) -> FloatArray:
         """Return the robot's record for the log at an instant; nothing changes.
 
@@ -187,7 +198,7 @@ class RobotNode:
         """Compute a sample; return the effort from now on, and what the robot tells the supervisor.
 
         Args:
-            time: Time of the sample [s].
+            time: Time of the sample, as the robot's clock shows it [s].
             measured: Its own state, then the object's pose, as it measures them.
             sample: Number of the sample, that of the time by default; the robot's clock may be wrong.
             stopped: Whether the drives brake.
@@ -195,6 +206,7 @@ class RobotNode:
         """
         self._number = period_of(time, self.period) if sample is None else sample
         doubts = stamps is not None and self._stamps.doubts(self._number, time, stamps)
+        time = self.instant(time, self._number)
         self._doubted = self._doubted + 1 if doubts else 0
         longest = whole_periods(LONGEST_DOUBT, self.period) if self._held else 0
         if self._doubted > longest and self.place.known:

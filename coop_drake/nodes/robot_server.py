@@ -69,7 +69,7 @@ class RobotServer(Server):
         measured = np.array([*question.robot_state, *question.object_pose])
         self._end.begin(number)
         self._say_place()
-        shown = tuple(node.look(time, measured))
+        shown = tuple(node.look(node.instant(time, number) if question.step else time, measured))
         if question.step:
             effort, said = self._steps(question, measured)
             for message in said:

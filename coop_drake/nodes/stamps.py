@@ -15,15 +15,20 @@ _SLEWED = 1e-3
 
 
 def certified_age(budget: Budget | None) -> float:
-    """Return the age of measurements for which a plan holds [s]; infinite without a budget."""
-    return inf if budget is None else whole_periods(budget.delay, budget.period) * budget.period
+    """Return the largest age of measurements for which a plan holds [s]; infinite without a budget."""
+    return (
+        inf
+        if budget is None
+        else whole_periods(budget.delay, budget.period) * budget.period + budget.age_error
+    )
 
 
 class StampCheck:
     """Compares the stamps of one robot's measurements with its clock.
 
-    A plan holds for measurements that are as old as robots take them for, and no older than its budget's
-    delay. Plans without a budget promise nothing, and nothing is compared.
+    A plan holds for measurements that are as old as robots take them for, but for what the error of their
+    clocks hides, and with this error no older than its budget allows. Plans without a budget promise nothing,
+    and nothing is compared.
 
     Args:
         period: Control period [s].
@@ -32,8 +37,9 @@ class StampCheck:
     """
 
     def __init__(self, period: float, budget: Budget | None, age: float) -> None:
-        self._period, self._oldest, self._age = period, certified_age(budget), age
-        self._compares = budget is not None
+        self._period, self._age, self._compares = period, age, budget is not None
+        self._error = 0.0 if budget is None else budget.clock_error
+        self._oldest = certified_age(budget) - self._error
         self._last: tuple[int, float, tuple[float, float]] | None = None
 
     def doubts(self, number: int, time: float, stamps: tuple[float, float]) -> bool:
@@ -48,9 +54,14 @@ class StampCheck:
             return False
         before, self._last = self._last, (number, time, stamps)
         for stamp in stamps:
-            age = min(time, self._age)  # what is measured before the start is what it was at the start
-            if time - stamp > self._oldest + _ROUNDING or abs(time - stamp - age) > _ROUNDING:
+            age = min(
+                number * self._period, self._age
+            )  # what is measured before the start is what it was then
+            seems = time - stamp
+            if not (seems <= self._oldest + _ROUNDING and abs(seems - age) <= self._error + _ROUNDING):
                 return True
+        if not abs(stamps[0] - stamps[1]) <= _ROUNDING:
+            return True
         if before is None:
             return False
         passed = (number - before[0]) * self._period

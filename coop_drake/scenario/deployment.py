@@ -296,6 +296,8 @@ class Deployment:
         joint_friction: Friction of every joint, which no robot knows of.
         pushes: Forces from outside.
         start_offset: How far the team stands away from the plan's start.
+        clock_error: By how much a robot's clock may be wrong, so that what it measures was measured so much
+            earlier or later than it takes it for; needs a control rate [s].
         budget: Under which budget of these departures a plan must hold: ``none``, ``position`` for
             the object's position alone, ``all`` for angles and joints, too; needs a control rate.
         seed: Seed of noise and losses.
@@ -312,6 +314,7 @@ class Deployment:
     joint_friction: JointFriction = field(default_factory=JointFriction)
     pushes: tuple[Push, ...] = ()
     start_offset: StartOffset = field(default_factory=StartOffset)
+    clock_error: Delay = 0.0
     budget: Literal["none", "position", "all"] = "none"
     seed: Annotated[int, Limits(at_least=0)] = 0
 
@@ -346,8 +349,12 @@ class Deployment:
 
     @property
     def command_age(self) -> float:
-        """Age of the measurements on which an effort rests: delay, losses, half a period and lag [s]."""
-        return self.whole_delay + self.held_age + 0.5 * (self.period or 0.0) + self.actuators.lag
+        """Age of the measurements on which an effort rests: delay, losses, half a period and lag [s].
+
+        Clocks may hide a part of it.
+        """
+        age = self.whole_delay + self.held_age + 0.5 * (self.period or 0.0) + self.actuators.lag
+        return age + self.clock_error
 
     @property
     def period(self) -> float | None:

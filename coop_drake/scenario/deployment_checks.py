@@ -32,6 +32,8 @@ def _without_rate(scenario: Scenario) -> Iterator[tuple[str, object, str]]:
         for name, value in ((one.name, getattr(values, one.name)) for one in fields(values)):
             if value:
                 yield f"{section}.{name}", value, "0 without deployment.control_rate"
+    if deployment.clock_error:
+        yield "clock_error", deployment.clock_error, "0 without deployment.control_rate"
     if deployment.budget != "none":
         yield "budget", deployment.budget, "none without deployment.control_rate"
     for robot, departures in deployment.robots.items():

@@ -27,6 +27,7 @@ from coop_drake.systems.reference_governor import GovernedCell, ReferenceGoverno
 from coop_drake.systems.robot_effort import RobotEffort
 from coop_drake.systems.selector import build_selector
 from coop_drake.systems.sensors import TeamSensor, build_separate_sensor
+from coop_drake.systems.shifted_measurement import ShiftedMeasurement
 from coop_drake.systems.state_predictor import StatePredictor
 from coop_drake.systems.sticking import Sticking
 from coop_drake.systems.team_controller import TeamController
@@ -71,6 +72,7 @@ __all__ = [
     "ReadyMonitor",
     "ReferenceGovernor",
     "RobotEffort",
+    "ShiftedMeasurement",
     "StatePredictor",
     "Sticking",
     "TeamController",

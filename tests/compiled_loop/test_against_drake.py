@@ -67,6 +67,8 @@ CASES = {
     "reports": at_200_hz(messages=Messages(loss=0.5, repeat=0.3, delay=0.02), seed=4),
     "pose and odometry": of_one(pose_bias=PoseBias(0.004, -0.002, 0.001), odometry_scale=0.05),
     "clock": of_one(clock_error=0.03, switch_delay=0.02),
+    "wrong clocks": at_200_hz(clock_error=0.006, measurements=Measurements(delay=0.01), seed=5),
+    "wrong clocks of present measurements": at_200_hz(clock_error=0.004, measurements=Measurements(5e-4)),
     "silence": of_one(silence=Silence(0.5, 0.02, motors="limp")),
     "silence from the start": of_one(silence=Silence(0.0, 1.2)),
     "blocked wheels": of_one(blocked=BlockedWheels(0.5, 0.02)),

@@ -19,8 +19,9 @@ from coop_drake.laws.departure import (
 
 
 def test_a_departure_is_unseen_for_delay_report_and_one_period_in_whole_periods():
-    assert unseen_time(0.01, 0.025, 0.005) == pytest.approx(0.04)
-    assert unseen_time(0.011, 0.0, 0.005) == pytest.approx(0.02)
+    assert unseen_time(0.01, 0.025, 0.005, 0.0) == pytest.approx(0.04)
+    assert unseen_time(0.011, 0.0, 0.005, 0.0) == pytest.approx(0.02)
+    assert unseen_time(0.011, 0.0, 0.005, 0.001) == pytest.approx(0.021)  # what clocks hide of the age
     assert growth(0.04, 0.2, 0.04) == pytest.approx(0.0016 + 0.00016)
 
 

@@ -41,6 +41,29 @@ def test_no_more_than_the_budgets_delay_is_allowed():
     assert not asked((0.98, 0.98), age=0.02, budget=replace(BUDGET, delay=0.02))
 
 
+def test_ages_may_be_wrong_by_the_error_of_the_clock_and_no_more():
+    """The error of its clock may hide as much again, so that drives take what is older by twice the error."""
+    wrong = replace(BUDGET, delay=0.01, clock_error=5e-4)
+    assert certified_age(wrong) == pytest.approx(0.011)
+    for late in (-5e-4, -2e-4, 0.0, 5e-4):
+        assert not asked((0.99 - late, 0.99 - late), budget=wrong)
+    for late in (-1e-3, -6e-4, 6e-4, 0.011):
+        assert asked((0.99 - late, 0.99 - late), budget=wrong)
+    assert asked((0.9902, 0.9898), budget=wrong)  # pose and state are measured at one instant
+    assert asked((1.0006, 1.0006), budget=replace(wrong, delay=0.0), age=0.0)  # of the future
+    assert not asked((1.0004, 1.0004), budget=replace(wrong, delay=0.0), age=0.0)
+    nothing = float("nan")
+    assert asked((nothing, nothing), budget=wrong)
+
+
+def test_a_clock_that_drifts_beyond_its_error_is_seen_by_the_ages():
+    check = StampCheck(T, replace(BUDGET, delay=0.01, clock_error=5e-4), 0.01)
+    doubts = [check.doubts(k, (1.0 + 1e-4) * k * T, (k * T - 0.01,) * 2) for k in range(10, 2000)]
+    first = doubts.index(True)
+    assert 4.9 < first * T < 5.1
+    assert all(doubts[first:])
+
+
 @pytest.mark.parametrize(
     ("times", "jumps"),
     [((1.0, 1.005, 1.010), False), ((1.0, 1.005, 1.012), True), ((1.0, 1.005, 1.006), True)],
@@ -77,6 +100,18 @@ def test_stamps_are_set_when_measured_and_go_through_all_that_delays_or_loses_a_
     assert (pose != state).any()
 
 
+def test_sensors_of_a_wrong_clock_measure_at_other_instants_and_their_stamps_say_so():
+    scenario, plan = sampled("base", measurements=Measurements(delay=0.02), clock_error=0.004)
+    exchange = Watching()
+    log = simulate_apart(scenario, plan, small_maps(), exchange=exchange)
+    assert log.reached
+    time, pose, state = np.array(exchange.seen).T
+    assert (pose == state).all()
+    shift = -pose[0]
+    assert 0.0 < abs(shift) <= 0.004
+    np.testing.assert_allclose(pose, np.maximum(time - 0.02, 0.0) - shift, atol=1e-12)
+
+
 class LateExchange(DirectExchange):
     """From a time on, every measurement is some samples older than it was before; its stamps say so."""
 
@@ -101,6 +136,15 @@ def test_a_team_whose_measurements_come_later_than_its_plan_allows_rests_and_say
     (stop,) = exchange.membership.stops
     assert 0.8 < stop.since < 0.88  # after a request for a hold; the monitor may be quicker
     assert np.abs(log.object_twist[-1]).max() < 0.05
+
+
+def test_a_clock_that_is_more_wrong_than_the_plan_allows_is_seen_at_once(transport):  # noqa: F811
+    scenario, plan, maps, _ = transport
+    wrong = replace(scenario, deployment=replace(scenario.deployment, clock_error=0.002))
+    log = simulate_apart(wrong, plan, maps)
+    assert not log.reached
+    assert log.times[-1] < 0.2
+    assert "lets the drives brake" in log.violation
 
 
 def test_drives_take_no_effort_that_rests_on_measurements_of_the_future_or_of_long_ago():

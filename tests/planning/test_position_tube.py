@@ -67,6 +67,54 @@ def test_random_disturbances_stay_in_the_tube_and_rest_nearer(name):
         assert np.abs(motion[-200:, 0] - motion[-200:, 2]).max() <= tube.rest + 1e-4
 
 
+def run_with_clocks(budget, generator, speed):
+    """e, e' at all samples of a team whose clocks jump about within their error: twenty steps a period."""
+    n, T, delay = 20, budget.period, ceil(budget.delay / budget.period - 1e-6)
+    h, factor, signs = T / n, 1.0 + budget.model_error * generator.uniform(-1.0, 1.0), np.ones(4)
+    flow, jumps = nominal_flow(GAINS.stiffness, GAINS.damping, T), generator.integers(1, 40)
+    p, v = np.zeros((2, 600 * n + 1))
+    nominal, led, s, goal = np.zeros((601, 2)), np.zeros(2), 0.0, 0.0
+    most = round(budget.age_error / h)
+    found = np.empty((600, 2))
+    for k in range(600):
+        nominal[k], now = led, k * n
+        found[k] = p[now] - led[0], v[now] - led[1]
+        signs = generator.choice([-1, 1], 4) if k % jumps == 0 else signs
+        then = max(k - delay, 0)
+        seen = np.clip(then * n - signs[0] * most, 0, now)
+        noise = signs[1] * budget.position_noise, signs[2] * budget.velocity_noise
+        u = -GAINS.stiffness * (led[0] - goal) - GAINS.damping * led[1]
+        u -= GAINS.tracking_stiffness * (p[seen] + noise[0] - nominal[then, 0])
+        u -= GAINS.tracking_damping * (v[seen] + noise[1] - nominal[then, 1])
+        for i in range(now, now + n):
+            s = u + (s - u) * np.exp(-h / budget.lag) if budget.lag else u
+            a = factor * s + signs[3] * budget.acceleration_error
+            p[i + 1], v[i + 1] = p[i] + h * v[i] + 0.5 * h * h * a, v[i] + h * a
+        led = np.array([goal, 0.0]) + flow[:, :2] @ (led - [goal, 0.0])
+        goal += speed * T
+    return found
+
+
+@pytest.mark.parametrize("clock_error", [5e-4, 2e-3])
+def test_clocks_that_jump_within_their_error_keep_the_object_in_the_tube(clock_error):
+    budget, generator = replace(BUDGET, clock_error=clock_error), np.random.default_rng(3)
+    (tube,) = position_tubes([GAINS], budget)
+    (right,) = position_tubes([GAINS], replace(budget, clock_error=0.0))
+    for _ in range(6):
+        away = np.abs(run_with_clocks(budget, generator, GAINS.speed))
+        assert (away.max(axis=0) <= [tube.radius, tube.rate]).all()
+    silent = replace(budget, position_noise=0.0, velocity_noise=0.0, acceleration_error=0.0, model_error=0.0)
+    (alone,) = position_tubes([GAINS], silent)
+    moved = np.abs(run_with_clocks(silent, generator, GAINS.speed))[300:, 0].max()
+    assert moved > 0.2 * alone.radius  # clocks alone take it there: what is counted is not beside the point
+    assert tube.radius > right.radius
+    assert tube.rest > right.rest
+
+
+def test_clocks_that_are_wrong_by_several_periods_leave_no_tube():
+    assert position_tubes([GAINS], replace(BUDGET, clock_error=0.05)) == [None]
+
+
 def test_without_departures_the_tube_is_what_sampling_leaves():
     (tube,) = position_tubes([GAINS], Budget())
     assert tube.radius < 0.005

@@ -45,6 +45,7 @@ EVERYTHING = Deployment(
     floor=Floor(coulomb_friction=1.0),
     joint_friction=JointFriction(coulomb=0.1),
     actuators=ActuatorLimits(lag=0.01),
+    clock_error=0.001,
 )
 
 
@@ -108,7 +109,7 @@ def test_a_block_without_state_has_none_and_any_other_says_which(blocks, name):
 
 def test_only_switches_jumps_holds_what_is_predicted_and_what_models_failures_are_remembered(blocks):
     remembering = {name for name in BLOCKS if any(map(len, state_of(blocks[name][0].CreateDefaultContext())))}
-    failures = {"Interruption", "LaggingEffort", "LossyMeasurement", "MessageChannel"}
+    failures = {"Interruption", "LaggingEffort", "LossyMeasurement", "MessageChannel", "ShiftedMeasurement"}
     holds = {"FunnelClock", "HoldMonitor", "HoldReceiver", "HoldSupervisor"}
     laws = {
         "CellPlanner",

@@ -78,6 +78,18 @@ def test_a_larger_budget_is_refused(plan, name):
     assert "tolerance" in refusal.value.where or refusal.value.where == "axis_tracking"
 
 
+def test_a_plan_for_right_clocks_is_refused_for_wrong_ones(plan):
+    """Whatever it states about how fast axes are: departures, levels and reserves are too small."""
+    wrong, axes = replace(plan.budget, clock_error=2e-4), plan.start.size - 2
+    with pytest.raises(RefusalError, match=r"axis_tracking\.rate: has 0 numbers, not"):
+        check_budget(replace(plan, budget=wrong))
+    for fast, where in ((1e-6, "axis_tracking.rate"), (5.0, "tolerance"), (100.0, "tolerance")):
+        tracking = replace(plan.axis_tracking, rate=(fast,) * axes, acceleration=(10.0 * fast,) * axes)
+        with pytest.raises(RefusalError) as refusal:
+            check_budget(replace(plan, budget=wrong, axis_tracking=tracking))
+        assert where in refusal.value.where
+
+
 def test_old_reports_leave_monitors_more_to_see_and_the_sets_of_axes_as_they_are(plan):
     """A nominal motion that is at rest stays there: its sets do not grow while a report travels."""
     old, T, angle = replace(plan.budget, report_age=0.2), plan.budget.period, plan.budget.angle_noise

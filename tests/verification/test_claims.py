@@ -41,6 +41,9 @@ SCENARIOS = ("base", "warehouse", "three", "tight", "elbow")
 EFFORTS = {"base_torque": 500.0, "joint_effort": 500.0}
 """Limits of efforts beside that of the preset [N m]."""
 
+CLOCKS = "warehouse"
+"""The scenario whose clocks are wrong."""
+
 CELLS = 2
 """So many cells of every plan are verified: the first and the last one are special."""
 
@@ -141,6 +144,7 @@ def case(name, required):
     scenario = load_scenario(MODELS / f"{name}.scenario.yaml")
     if required:
         departures = {"preset": "mobile_base", "budget": "all", "actuators": EFFORTS}
+        departures |= {"clock_error": 1e-4} if name == CLOCKS else {}
         deployed = Deployment.completed(departures, "deployment")
         scenario = replace(scenario, deployment=convert_class(deployed, Deployment))
     problem, gains = planning_problem(scenario), scenario.gain_sets

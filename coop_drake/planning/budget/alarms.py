@@ -5,55 +5,73 @@ from __future__ import annotations
 import numpy as np
 
 from coop_drake.answers.alarms import Alarms
+from coop_drake.answers.axis_tracking import AxisTracking
 from coop_drake.answers.budget import Budget
 from coop_drake.answers.position_tube import PositionTube
 from coop_drake.laws.departure import growth, unseen_time
 from coop_drake.tree.pose import FloatArray
 
 
-def position_room(budget: Budget, radius: float) -> float:
-    """Return how far the object may be off its nominal position while no report tells of it [m].
-
-    Args:
-        budget: The budget.
-        radius: r, how far it may be off within the budget [m].
-    """
+def position_room(budget: Budget, tube: PositionTube) -> float:
+    """Return how far the object may be off its nominal position while no report tells of it [m]."""
     grown = growth(budget.velocity_noise, budget.acceleration_error, _unseen(budget))
-    return radius + (budget.single_noise + 1.0) * budget.position_noise + grown
+    return _position_level(budget, tube) + budget.position_noise + budget.age_error * tube.velocity + grown
 
 
-def axis_reserve(budget: Budget, axes: int) -> FloatArray:
+def mistaken(budget: Budget, tracking: AxisTracking, axes: int) -> FloatArray:
+    """Return by how much axes and their rates are measured wrongly as ages are wrong, shape (2, axes)."""
+    if not budget.age_error or not tracking.rate:
+        return np.zeros((2, axes))
+    return budget.age_error * np.array([tracking.rate, tracking.acceleration])
+
+
+def axis_reserve(budget: Budget, tracking: AxisTracking, axes: int) -> FloatArray:
     """Return what noise and growth need beside the level of every axis (theta, q...), shape (axes,)."""
     grown = growth(budget.rate_noise, budget.axis_acceleration_error, _unseen(budget))
-    return np.full(axes, budget.angle_noise + grown)
+    reserve: FloatArray = budget.angle_noise + grown + mistaken(budget, tracking, axes)[0]
+    return reserve
 
 
-def axis_noises(budget: Budget, axes: int) -> FloatArray:
+def axis_noises(budget: Budget, tracking: AxisTracking, axes: int) -> FloatArray:
     """Return the largest errors of one robot, of the axes and of their rates, shape (2, axes).
 
     All robots measure the object's angle, each its own joints.
     """
     single = np.ones(axes)
     single[0] = budget.single_noise
-    return np.outer([budget.angle_noise, budget.rate_noise], single)
+    noises: FloatArray = np.outer([budget.angle_noise, budget.rate_noise], single)
+    return noises + mistaken(budget, tracking, axes)
 
 
-def least_distance(budget: Budget, axes: int) -> FloatArray:
+def least_distance(budget: Budget, tracking: AxisTracking, axes: int) -> FloatArray:
     """Return the least distance to its funnel's bounds that an axis must keep, shape (axes,) [rad or m]."""
-    distance: FloatArray = axis_noises(budget, axes)[0] + axis_reserve(budget, axes)
+    distance: FloatArray = axis_noises(budget, tracking, axes)[0] + axis_reserve(budget, tracking, axes)
     return distance
 
 
-def alarms_of(budget: Budget, tube: PositionTube, axes: int) -> Alarms:
-    """Return the levels that all transitions have in common; ``axes`` is the number of axes (theta, q...)."""
+def alarms_of(budget: Budget, tube: PositionTube, tracking: AxisTracking | None, axes: int) -> Alarms:
+    """Return the levels that all transitions have in common.
+
+    Args:
+        budget: The budget.
+        tube: The tube of the object's position.
+        tracking: How axes are pulled to their nominal motions, None where the budget has no axes.
+        axes: Number of axes (theta, q...).
+    """
+    fastest = (1.0 + budget.model_error) * tube.acceleration + budget.acceleration_error
+    mistaken_rate = budget.age_error * fastest
     return Alarms(
-        tube.radius + budget.single_noise * budget.position_noise,
-        tube.rate + budget.single_noise * budget.velocity_noise,
-        axis_reserve(budget, axes) if budget.axes else np.empty(0),
+        _position_level(budget, tube),
+        tube.rate + budget.single_noise * budget.velocity_noise + mistaken_rate,
+        np.empty(0) if tracking is None else axis_reserve(budget, tracking, axes),
         budget.grasp_noise,
         budget.turn_noise,
     )
 
 
+def _position_level(budget: Budget, tube: PositionTube) -> float:
+    return tube.radius + budget.single_noise * budget.position_noise + budget.age_error * tube.velocity
+
+
 def _unseen(budget: Budget) -> float:
-    return unseen_time(budget.delay, budget.report_age, budget.period)
+    return unseen_time(budget.delay, budget.report_age, budget.period, budget.age_error)

@@ -15,6 +15,10 @@ The loop e'' = f q is linear and does not vary in time, so that |e| is at most t
 its responses' magnitudes times the largest size of what enters: noise of a command, and accelerations. Hand-
 overs and funnels do not appear in it. Only a^ is larger in one transition than in another: what entered
 longer ago than ``MEMORY`` is counted with its largest size in the whole plan.
+
+Where the age of measurements may be wrong by s, what was measured belongs to another instant than the nominal
+state with which it is compared. So n_x is larger by s times the largest |x'| of the axis at any time, and n_v
+by s times its largest |x''|, which the plan states (``AxisTracking``).
 """
 
 from __future__ import annotations
@@ -29,6 +33,7 @@ from coop_drake.answers.budget import Budget
 from coop_drake.compiled import compiled
 from coop_drake.laws.nominal_axes import lag_factors
 from coop_drake.laws.sampling import whole_periods
+from coop_drake.planning.budget.alarms import mistaken
 from coop_drake.tree.pose import FloatArray
 
 MODEL_PARTS = 5
@@ -102,21 +107,24 @@ class AxisLoop:
         """Largest error of the model in every part, shape (parts,) [-]."""
         return np.abs(np.array(self.factors) - 1.0) + self.rest
 
-    @property
-    def noises(self) -> FloatArray:
-        """What noise causes of x [rad or m], x' [rad/s or m/s] and the pull, shape (parts, 3)."""
-        noise = (
-            self.tracking.stiffness * self.budget.angle_noise + self.tracking.damping * self.budget.rate_noise
-        )
-        caused: FloatArray = noise * (self.sums[:, :, COMMAND] + [0.0, 0.0, 1.0])
+    def noises(self, axes: int) -> FloatArray:
+        """Return what noise causes of x [rad or m], x' [rad/s or m/s] and the pull, (axes, parts, 3)."""
+        wrong = np.array([[self.budget.angle_noise], [self.budget.rate_noise]])
+        wrong = wrong + mistaken(self.budget, self.tracking, axes)
+        noise = self.tracking.stiffness * wrong[0] + self.tracking.damping * wrong[1]
+        caused: FloatArray = noise[:, None, None] * (self.sums[:, :, COMMAND] + [0.0, 0.0, 1.0])
         return caused
 
     def typical(self) -> tuple[float, float]:
-        """Return the largest departures of a typical axis [rad or m] and of its rate [rad/s or m/s]."""
+        """Return the largest departures of a typical axis [rad or m] and of its rate [rad/s or m/s].
+
+        Errors of clocks are not counted, for they depend on how fast the axes are.
+        """
         pushes, error = self.sums[:, :, ACCELERATION], self.budget.axis_acceleration_error
+        noises = self.noises(1)[0]
         steady = error + self.errors * TYPICAL_ACCELERATION
-        pull = (self.noises[:, Q] + steady * pushes[:, Q]) / (1.0 - self.rest * pushes[:, Q])
-        found = self.noises[:, :Q] + (steady + self.rest * pull)[:, None] * pushes[:, :Q]
+        pull = (noises[:, Q] + steady * pushes[:, Q]) / (1.0 - self.rest * pushes[:, Q])
+        found = noises[:, :Q] + (steady + self.rest * pull)[:, None] * pushes[:, :Q]
         away, fast = found.max(axis=0).tolist()
         return away, fast
 

@@ -106,7 +106,7 @@ def departing(
     found, state = np.empty((4, samples + 1, axes)), np.concatenate([before.state, before.state[1:]])
     left = lag_factors(budget.period, budget.lag)[0]
     scales = _Scales(budget.period, budget.model_error, budget.axis_acceleration_error, loop.rest, left)
-    responses = loop.kicks, loop.sums[:, :, LATE].copy(), loop.noises, loop.errors
+    responses = loop.kicks, loop.sums[:, :, LATE].copy(), loop.noises(axes), loop.errors
     _carry(responses, leaving, scales, coupling, moving, entered, state, found)
     highest = np.maximum.accumulate(entered[..., ::-1], axis=3)[..., ::-1]
     first = min(leaving, samples + 1)
@@ -160,7 +160,8 @@ def _answers(kicks: FloatArray, entered: FloatArray, first: FloatArray) -> tuple
 
 _Responses = tuple[FloatArray, FloatArray, FloatArray, FloatArray]
 """To a unit of acceleration in one period, the oldest first, shape (parts, 3, memory); sums of those that are
-older, and x, x' and the pull that noise causes, shape (parts, 3) each; largest |epsilon| of every part."""
+older, shape (parts, 3); x, x' and the pull that noise causes, shape (axes, parts, 3); largest |epsilon| of
+every part."""
 
 
 @compiled
@@ -197,9 +198,9 @@ def _carry(
                 window = entered[:, p, i, k : memory + k]
                 x, v, q, first = _answers(kicks[p], window[0], window[1])
                 most = state[0, p, i] = max(state[0, p, i], entered[0, p, i, memory + k - 1])
-                now[0, p, i] = noise[p, 0] + x + late[p, 0] * most
-                now[1, p, i] = noise[p, 1] + v + late[p, 1] * most
-                pull = noise[p, 2] + q + late[p, 2] * most
+                now[0, p, i] = noise[i, p, 0] + x + late[p, 0] * most
+                now[1, p, i] = noise[i, p, 1] + v + late[p, 1] * most
+                pull = noise[i, p, 2] + q + late[p, 2] * most
                 now[2, p, i] = max(pull, state[1, p, i])
                 now[3, p, i] = first + late[p, 1] * most
                 state[1, p, i] = pull + scales.left * max(state[1, p, i] - pull, 0.0)
@@ -286,7 +287,7 @@ def _settle(
                 for j in range(4):
                     to = j % 2 if j == 3 else j
                     caused = kicks[p, to].sum() * most[j // 3, p, i] + late[p, to] * state[0, p, i]
-                    now[j, p, i] = caused + (noise[p, j] if j < 3 else 0.0)
+                    now[j, p, i] = caused + (noise[i, p, j] if j < 3 else 0.0)
                 now[2, p, i] = max(now[2, p, i], state[1, p, i])
         _enter(now, moving, (coupling, errors), scales, found[:, ever], flowing)
         if (flowing <= most).all():

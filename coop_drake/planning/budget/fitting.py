@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
+from coop_drake.answers.axis_tracking import AxisTracking
 from coop_drake.answers.budget import Budget, Tolerance
 from coop_drake.answers.plan import Plan, Transition
 from coop_drake.answers.problem import PlanningProblem
@@ -13,7 +15,7 @@ from coop_drake.laws import ScheduledGains
 from coop_drake.laws.axis_table import LEAVING_TIME, REST_RATE, REST_REACH, axis_table
 from coop_drake.laws.gains import IDEAL_AGE, RestCondition
 from coop_drake.planning.budget.alarms import axis_noises
-from coop_drake.planning.budget.axis_departure import SLACK, best_loop
+from coop_drake.planning.budget.axis_departure import SLACK, AxisLoop, best_loop
 from coop_drake.planning.budget.coupling import TeamCouplings, team_couplings
 from coop_drake.planning.budget.restarting import with_restart
 from coop_drake.planning.budget.transitions import (
@@ -28,6 +30,12 @@ from coop_drake.tree.pose import FloatArray
 AGE_FACTORS = (1.0, 1.25, 1.6, 2.0, 2.3, 2.6, 3.0)
 """Gains are tried for so many times the age of what a nominal motion's commands rest on [-]: slow motions
 take smaller accelerations and rates, in which the error of the model has its share."""
+
+CLOCK_ROUNDS = 8
+"""Largest number of rates and accelerations that are tried where ages are wrong [-]."""
+
+CLOCK_ROOM = 1.05
+"""Factor by which the next ones are larger than those that were reached [-]."""
 
 _UNSTABLE = UnprovedTransition(0, 0, "is not stable under the delay, the lag and the model's error")
 
@@ -72,15 +80,40 @@ def fit_budget(
 
     couplings, efforts = team or team_couplings(budget, problem.tree, plan.cells)
     limited = None if efforts is None else LimitedEfforts(efforts, acceleration)
-    found = follow_transitions(table_of, len(factors), couplings.rates[:, 1:], plan.start[2:], loop, limited)
-    if isinstance(found, UnprovedTransition):
-        return found
+    for _ in range(CLOCK_ROUNDS if budget.clock_error else 1):
+        found = follow_transitions(
+            table_of, len(factors), couplings.rates[:, 1:], plan.start[2:], loop, limited
+        )
+        if isinstance(found, UnprovedTransition):
+            return found
+        faster = _faster(found, loop)
+        if faster is None:
+            break
+        loop = replace(loop, tracking=faster)
+    else:
+        return UnprovedTransition(0, None, "an axis may be too fast for the error of the clocks")
     fitted = tuple(
-        _stated(plans[passed.choice].transitions[k], passed, factors[passed.choice], budget)
+        _stated(plans[passed.choice].transitions[k], passed, factors[passed.choice], loop)
         for k, passed in enumerate(found)
     )
     fitted_plan = replace(plans[0], transitions=fitted, budget=budget, axis_tracking=loop.tracking)
     return with_restart(fitted_plan, loop, couplings.rates[:, 1:], limited)
+
+
+def _faster(found: Sequence[ProvedTransition], loop: AxisLoop) -> AxisTracking | None:
+    """Return larger rates and accelerations of axes that wrong ages shall count with; None if these are none.
+
+    Departures grow with them, and they with departures.
+    """
+    if not loop.budget.clock_error:
+        return None
+    reached, known = np.max([one.reached for one in found], axis=0), np.zeros((2, len(found[0].sets)))
+    if loop.tracking.rate:
+        known[:] = loop.tracking.rate, loop.tracking.acceleration
+    if (reached <= known).all():
+        return None
+    rate, acceleration = np.maximum(CLOCK_ROOM * reached, known).tolist()
+    return replace(loop.tracking, rate=tuple(rate), acceleration=tuple(acceleration))
 
 
 def _factors(gain_set: ScheduledGains, budget: Budget) -> list[float]:
@@ -89,19 +122,19 @@ def _factors(gain_set: ScheduledGains, budget: Budget) -> list[float]:
     return [age / gain_set.age * factor for factor in AGE_FACTORS]
 
 
-def _stated(transition: Transition, passed: ProvedTransition, factor: float, budget: Budget) -> Transition:
+def _stated(transition: Transition, passed: ProvedTransition, factor: float, loop: AxisLoop) -> Transition:
     """Return a transition with what it states: its condition of rest, and the sets of its axes."""
     table = passed.table
     rest = RestCondition(
         float(table[0, LEAVING_TIME]), table[:, REST_REACH].copy(), table[:, REST_RATE].copy()
     )
     gains = replace(transition.gains, rest=rest)
-    return replace(transition, gains=gains, tolerance=_tolerance(factor, passed, budget))
+    return replace(transition, gains=gains, tolerance=_tolerance(factor, passed, loop))
 
 
-def _tolerance(factor: float, passed: ProvedTransition, budget: Budget) -> Tolerance:
+def _tolerance(factor: float, passed: ProvedTransition, loop: AxisLoop) -> Tolerance:
     entries, every = passed.entries, passed.sets
-    noise, rate_noise = axis_noises(budget, len(every))
+    noise, rate_noise = axis_noises(loop.budget, loop.tracking, len(every))
     return Tolerance(
         age_factor=factor,
         entry_lower=np.array([entry.lower for entry in entries]),

@@ -165,10 +165,10 @@ def _fastest(
         if isinstance(tube, UnprovedPosition):
             found = tube
             continue
-        found = _within(problem, uniform, tube, position_room(budget, tube.radius))
+        found = _within(problem, uniform, tube, position_room(budget, tube))
         if isinstance(found, UnprovedPosition):
             continue
-        alarms = alarms_of(budget, tube, plan.start.size - 2)
+        alarms = alarms_of(budget, tube, plan.axis_tracking, plan.start.size - 2)
         found = timed(replace(found, budget=budget, alarms=alarms))
         if best is not None and plan_time(best) <= plan_time(found):
             break

@@ -11,6 +11,11 @@ inputs at earlier samples j is a sum of h(k - j) times the inputs, so that the l
 bounded size is the sum of all |h| times their bound, for vectors in the plane, too, because both coordinates
 have the same h. Inputs are what noise adds to a command, the accelerations w, and the steps of p_G, each of
 at most T times its largest speed.
+
+Where the age of measurements may be wrong by s, a robot compares what was measured with the nominal state of
+another instant, by at most s away. So n_p is larger by s times the largest |p'|, and n_v by s times the
+largest |p''|, both of the object and not of its nominal motion alone: a longer or shorter delay of the loop
+is in it.
 """
 
 from __future__ import annotations
@@ -115,20 +120,47 @@ def _bounds(gains: PositionGains, budget: Budget, sums: FloatArray | None, rest:
     if sums is None or rest * sums[2, 1] >= 1.0:
         return None
     noise = gains.tracking_stiffness * budget.position_noise + gains.tracking_damping * budget.velocity_noise
-    quiet = noise * sums[:, 0] + budget.acceleration_error * sums[:, 1]
-    moving = quiet + gains.speed * sums[:, 2]
-    still = quiet[2] + noise
-    command = (moving[2] + noise + gains.speed * sums[3, 2]) / (1.0 - rest * sums[2, 1])
-    settled = still / (1.0 - rest * sums[2, 1])
-    radius, rate = moving[:2] + rest * command * sums[:2, 1]
-    nominal = gains.speed * sums[3, 2]
-    relative = (1.0 + budget.model_error) * command + nominal + budget.acceleration_error
-    between = budget.period**2 / 8.0 * relative
-    rests = quiet[0] + rest * settled * sums[0, 1]
-    rate += budget.period / 2.0 * relative
-    velocity = gains.speed * sums[4, 2] + rate + budget.period / 2.0 * nominal
+    moving = _with_clocks(gains, budget, sums, rest, gains.speed)
+    still = _with_clocks(gains, budget, sums, rest, 0.0)
+    if moving is None or still is None:
+        return None
+    radius, rate, velocity, command, acceleration = moving
+    between = budget.period**2 / 8.0 * (acceleration + gains.speed * sums[3, 2])
     own = command + (budget.single_noise - 1.0) * noise
-    return np.array([radius + between, rate, velocity, rests + between, own])
+    return np.array([radius + between, rate, velocity, still[0] + between, own])
+
+
+def _with_clocks(
+    gains: PositionGains, budget: Budget, sums: FloatArray, rest: float, speed: float
+) -> FloatArray | None:
+    """Return bounds of e at samples, e', p', of the command and of p'', shape (5,), for a speed of p_G.
+
+    They grow with what noise adds to a command, and where ages are wrong this grows with |p'| and |p''|; None
+    where there is no end to it.
+    """
+    T, nominal, stiff, damped = (
+        budget.period,
+        speed * sums[3, 2],
+        gains.tracking_stiffness,
+        gains.tracking_damping,
+    )
+
+    def caused(noise: float) -> FloatArray:
+        moving = noise * sums[:, 0] + budget.acceleration_error * sums[:, 1] + speed * sums[:, 2]
+        command = (moving[2] + noise + nominal) / (1.0 - rest * sums[2, 1])
+        away, rate = moving[:2] + rest * command * sums[:2, 1]
+        acceleration = (1.0 + budget.model_error) * command + budget.acceleration_error
+        rate += T / 2.0 * (acceleration + nominal)
+        velocity = speed * sums[4, 2] + rate + T / 2.0 * nominal
+        return np.array([away, rate, velocity, command, acceleration])
+
+    def mistaken(found: FloatArray) -> float:
+        return budget.age_error * float(stiff * found[2] + damped * found[4])
+
+    noise = stiff * budget.position_noise + damped * budget.velocity_noise
+    least = mistaken(caused(0.0))
+    grows = mistaken(caused(1.0)) - least
+    return caused((noise + least) / (1.0 - grows)) if grows < 1.0 else None
 
 
 def _sums_of(loop: Loop, budget: Budget, error: float) -> FloatArray | None:

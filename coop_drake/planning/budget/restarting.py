@@ -52,7 +52,7 @@ def with_restart(plan: Plan, loop: AxisLoop, couplings: FloatArray, limited: Lim
         The plan; without such a statement where limits allow no motion of the usual kind.
     """
     every = [transition.gains for transition in plan.transitions]
-    limits = [(gains.rate_limit, gains.acceleration_limit) for gains in every]
+    counted = loop.tracking.rate or None, loop.tracking.acceleration or None  # with which wrong ages count
     resting = _resting(loop)
     for share in SLOWER:
         rate, acceleration = share * RATE, share * ACCELERATION
@@ -60,7 +60,8 @@ def with_restart(plan: Plan, loop: AxisLoop, couplings: FloatArray, limited: Lim
         within = [
             (fastest is None or (rate + one.rate + resting[1] < fastest).all())
             and (most is None or (acceleration + one.acceleration + resting[2] < most).all())
-            for one, (fastest, most) in zip(found, limits, strict=True)
+            for one, limits in zip(found, every, strict=True)
+            for fastest, most in ((limits.rate_limit, limits.acceleration_limit), counted)
         ]
         pulls = np.array([one.pull + resting[2] for one in found])
         within += [] if limited is None else _efforts_kept(limited, loop.budget, (rate, acceleration), pulls)

@@ -88,6 +88,7 @@ class ProvedTransition:
         spare: Least distances of the axes to their funnels' bounds, shape (axes,) [rad or m].
         departure: Largest departures from them, shape (axes,) [rad or m].
         rate_departure: Largest departures of the rates, shape (axes,) [rad/s or m/s].
+        reached: Largest rates and accelerations of the axes, departures included, shape (2, axes).
         effort: Largest efforts, as a ``Tolerance`` states them.
         inflow: What has entered the loops of its axes when the next one begins.
         choice: Number of the gains that it has.
@@ -99,6 +100,7 @@ class ProvedTransition:
     spare: FloatArray
     departure: FloatArray
     rate_departure: FloatArray
+    reached: FloatArray
     effort: FloatArray
     inflow: Inflow
     choice: int = 0
@@ -167,20 +169,23 @@ def _attempt(
     found = Departures(*((1.0 + OTHERWISE) * one for one in found))
     departure, rate_departure, push, _ = (one.max(axis=0) for one in found)
     spare = np.array([(1.0 - SLACK) * sets.spare(found.position[:, i]) for i, sets in enumerate(every)])
-    needed = least_distance(budget, len(every))
+    needed = least_distance(budget, loop.tracking, len(every))
+    reached = np.empty((2, len(every)))
     for axis, sets in enumerate(every):
         if not spare[axis] > 0.0:
             return UnprovedTransition(k, axis, "may leave its funnel")
         if not spare[axis] > needed[axis]:
             return UnprovedTransition(k, axis, "may leave its funnel before its monitor sees it")
-        if not (1.0 + SLACK) * sets.fastest(found.rate[:, axis], T) < table[axis, RATE_LIMIT]:
+        reached[0, axis] = (1.0 + SLACK) * sets.fastest(found.rate[:, axis], T)
+        reached[1, axis] = (1.0 + SLACK) * sets.acceleration + push[axis]
+        if not reached[0, axis] < table[axis, RATE_LIMIT]:
             return UnprovedTransition(k, axis, "may exceed the limit of its rate")
-        if not (1.0 + SLACK) * sets.acceleration + push[axis] <= table[axis, ACCELERATION_LIMIT]:
+        if not reached[1, axis] <= table[axis, ACCELERATION_LIMIT]:
             return UnprovedTransition(k, axis, "may exceed the limit of its acceleration")
     effort = np.zeros(0) if limited is None else _effort(k, limited, every, found, budget)
     if isinstance(effort, UnprovedTransition):
         return effort
-    return ProvedTransition(table, entries, every, spare, departure, rate_departure, effort, inflow)
+    return ProvedTransition(table, entries, every, spare, departure, rate_departure, reached, effort, inflow)
 
 
 def _effort(

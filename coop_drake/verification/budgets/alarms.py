@@ -12,11 +12,13 @@ from math import ceil
 import numpy as np
 
 from coop_drake.answers.alarms import Alarms
+from coop_drake.answers.axis_tracking import AxisTracking
 from coop_drake.answers.budget import Budget, Tolerance
 from coop_drake.answers.plan import Plan
 from coop_drake.answers.position_tube import PositionTube
 from coop_drake.errors import RefusalError
 from coop_drake.tree.pose import FloatArray
+from coop_drake.verification.budgets.axis_departure import mistaken
 
 ROUNDING = 1e-9
 """Differences that rounding explains [m, rad, and per second]."""
@@ -42,8 +44,11 @@ def check_alarms(alarms: Alarms, tube: PositionTube, budget: Budget) -> float:
         RefusalError: Names the level.
     """
     one = budget.single_noise
-    _check(alarms.position, tube.radius + one * budget.position_noise, "alarms.position")
-    _check(alarms.velocity, tube.rate + one * budget.velocity_noise, "alarms.velocity")
+    late = 2.0 * budget.clock_error
+    position = one * budget.position_noise + late * tube.velocity
+    pushed = (1.0 + budget.model_error) * tube.acceleration + budget.acceleration_error
+    _check(alarms.position, tube.radius + position, "alarms.position")
+    _check(alarms.velocity, tube.rate + one * budget.velocity_noise + late * pushed, "alarms.velocity")
     for name, stated, noise in (
         ("grasp", alarms.grasp, budget.grasp_noise),
         ("turn", alarms.turn, budget.turn_noise),
@@ -54,11 +59,13 @@ def check_alarms(alarms: Alarms, tube: PositionTube, budget: Budget) -> float:
             _check(stated, noise, f"alarms.{name}")
     if not budget.axes and alarms.axis_reserve.size:
         raise RefusalError("alarms.axis_reserve", "is stated, but the plan has no budget for the axes")
-    unnoticed = budget.position_noise + _grows(budget, budget.velocity_noise, budget.acceleration_error)
-    return alarms.position + unnoticed
+    unnoticed = budget.position_noise + late * tube.velocity
+    return alarms.position + unnoticed + _grows(budget, budget.velocity_noise, budget.acceleration_error)
 
 
-def check_axis_alarms(alarms: Alarms, stated: Tolerance, budget: Budget, where: str) -> None:
+def check_axis_alarms(
+    alarms: Alarms, stated: Tolerance, budget: Budget, tracking: AxisTracking, where: str
+) -> None:
     """Check the levels of the axes in a transition, and that they leave room.
 
     Where an axis is near a bound of its funnel, its level is what the reserve leaves of the nominal distance.
@@ -68,22 +75,24 @@ def check_axis_alarms(alarms: Alarms, stated: Tolerance, budget: Budget, where: 
         RefusalError: Names the level and the axis.
     """
     axes = stated.departure.size
+    late = np.broadcast_to(mistaken(tracking, budget), (2, axes))
     noise = np.where(np.arange(axes) == 0, budget.single_noise, 1.0)
+    wrong = np.outer([budget.angle_noise, budget.rate_noise], noise) + late
     for name, departure, size in (
-        ("alarm", stated.departure, budget.angle_noise),
-        ("rate_alarm", stated.rate_departure, budget.rate_noise),
+        ("alarm", stated.departure, wrong[0]),
+        ("rate_alarm", stated.rate_departure, wrong[1]),
     ):
         levels: FloatArray = getattr(stated, name)
         if levels.shape != departure.shape:
             raise RefusalError(f"{where}.{name}", f"has {levels.size} numbers, not {axes}")
-        for axis, (level, least) in enumerate(zip(levels, departure + noise * size, strict=True)):
+        for axis, (level, least) in enumerate(zip(levels, departure + size, strict=True)):
             _check(float(level), float(least), f"{where}.{name}[{axis}]")
     if alarms.axis_reserve.shape != (axes,):
         raise RefusalError("alarms.axis_reserve", f"has {alarms.axis_reserve.size} numbers, not {axes}")
     needed = budget.angle_noise + _grows(budget, budget.rate_noise, budget.axis_acceleration_error)
     for axis, reserve in enumerate(alarms.axis_reserve):
-        _check(float(reserve), needed, f"alarms.axis_reserve[{axis}]")
-        room = float(stated.distance[axis] - noise[axis] * budget.angle_noise)
+        _check(float(reserve), float(needed + late[0, axis]), f"alarms.axis_reserve[{axis}]")
+        room = float(stated.distance[axis] - wrong[0, axis])
         if not room >= reserve - ROUNDING:
             finding = f"leaves {room:.6g} beside a robot's noise; its monitor needs {reserve:.6g}"
             raise RefusalError(f"{where}.distance[{axis}]", finding)
@@ -98,8 +107,10 @@ def _check(stated: float, least: float, where: str) -> None:
 def _grows(budget: Budget, rate: float, acceleration: float) -> float:
     """Return by how much a departure grows that moves no faster than noise hides, until reports know of it.
 
-    In the age of the measurements, in that of reports, each in whole periods, and in one period more.
+    In the age of the measurements, in that of reports, each in whole periods, in one period more, and in what
+    clocks hide of the age.
     """
     T = budget.period
     time = T * (1 + ceil(budget.delay / T - 1e-9) + ceil(budget.report_age / T - 1e-9))
+    time += 2.0 * budget.clock_error
     return rate * time + acceleration * time * time / 2.0

@@ -44,7 +44,7 @@ class Loop(NamedTuple):
         recent: Sizes of the responses of e, e' and q to a unit of acceleration in one period, the oldest
             first, shape (p, memory, 3).
         old: Sums of those that are older, shape (p, 3).
-        noise: What noise causes of e, e' and the pull, shape (p, 3).
+        noise: What noise causes of e, e' and the pull, of every axis or of all, shape (p, axes or 1, 3).
         errors: Largest |epsilon| of every part, shape (p, 1).
         spread: Largest |d| [-].
         started: Largest |e|, |e'| and |q| at all times after a unit of e' at the beginning, and in all
@@ -105,8 +105,9 @@ def loop_of(tracking: AxisTracking, budget: Budget) -> Loop:
     kicks = np.array(sizes).transpose(2, 0, 1)
     if not (spread * kicks[:, :, 2].sum(axis=1) < 1.0).all():
         raise RefusalError("axis_tracking", "the error of the model may exceed what the loop makes up for")
-    size = tracking.stiffness * budget.angle_noise + tracking.damping * budget.rate_noise
-    noise = size * (command.T + np.array([0.0, 0.0, 1.0]))
+    x, v = mistaken(tracking, budget)
+    size = tracking.stiffness * (budget.angle_noise + x) + tracking.damping * (budget.rate_noise + v)
+    noise = size[:, None] * (command.T + np.array([0.0, 0.0, 1.0]))[:, None]
     recent = np.ascontiguousarray(kicks[:, :memory][:, ::-1])
     return Loop(
         budget,
@@ -117,6 +118,16 @@ def loop_of(tracking: AxisTracking, budget: Budget) -> Loop:
         spread,
         (started + tracking.damping * delay * largest).T,
     )
+
+
+def mistaken(tracking: AxisTracking, budget: Budget) -> FloatArray:
+    """Return what wrong ages make of measured axes and of their rates, (2, axes), or (2, 1) for nothing.
+
+    What a robot takes for the state at an instant was so up to twice its clock's error before or after it.
+    """
+    if not budget.clock_error:
+        return np.zeros((2, 1))
+    return 2.0 * budget.clock_error * np.array([tracking.rate, tracking.acceleration])
 
 
 def resting(loop: Loop, axes: int) -> Entered:
@@ -178,7 +189,7 @@ def _state(
 ) -> tuple[FloatArray, FloatArray]:
     """Return |e|, |e'|, the lagging pull and the rate that others' terms see, (4, p, axes), and the pull."""
     old = largest[..., None] * loop.old[:, None]
-    whole = loop.noise[:, None] + answers[0] + old
+    whole = loop.noise + answers[0] + old
     seen = answers[1, :, :, 1] + old[..., 1]
     pulled = whole[..., 2]
     return np.stack([whole[..., 0], whole[..., 1], np.maximum(pulled, lagging), seen]), pulled

@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from coop_drake.answers.axis_tracking import AxisTracking
 from coop_drake.answers.budget import Tolerance
 from coop_drake.answers.plan import Plan, Transition
 from coop_drake.errors import RefusalError
@@ -55,7 +56,7 @@ def check_budget(plan: Plan, tree: ComponentTree | None = None) -> Check | None:
             if stated is not None:
                 raise RefusalError(where, "is stated, but the plan has no budget for the axes")
         return None if plan.budget is None else Check("angles and joints are not part of the budget", 0)
-    loop, terms = _loop(plan), _coupling(plan, tree)
+    loop, terms, tracking = _loop(plan), _coupling(plan, tree), _tracking(plan)
     entered = resting(loop, plan.start.size - 2)
     smallest, count, entry, every = np.inf, 0, _start(plan), list[Asked]()
     for k, transition in enumerate(plan.transitions):
@@ -69,8 +70,8 @@ def check_budget(plan: Plan, tree: ComponentTree | None = None) -> Check | None:
         _check_entry(stated, entry, f"{where}.tolerance")
         motion, entry = _check_motion(plan, k, stated, f"{where}.tolerance")
         away, entered = departures(loop, terms[k], motion.moving, entered, motion.leaving)
-        _check_departures(transition, motion, away, f"{where}.tolerance")
-        check_axis_alarms(alarms_of(plan), stated, plan.budget, f"{where}.tolerance")
+        _check_departures(transition, motion, away, tracking, f"{where}.tolerance")
+        check_axis_alarms(alarms_of(plan), stated, plan.budget, tracking, f"{where}.tolerance")
         every.append(asked(plan.budget, motion.moving, away[:, 3]))
         smallest, count = min(smallest, float(stated.distance.min())), count + stated.distance.size
     if plan.budget.limited:
@@ -82,10 +83,21 @@ def check_budget(plan: Plan, tree: ComponentTree | None = None) -> Check | None:
 
 
 def _loop(plan: Plan) -> Loop:
-    if plan.axis_tracking is None:
-        raise RefusalError("axis_tracking", "is missing, but the plan has a budget")
     assert plan.budget is not None  # checked by the caller
-    return loop_of(plan.axis_tracking, plan.budget)
+    return loop_of(_tracking(plan), plan.budget)
+
+
+def _tracking(plan: Plan) -> AxisTracking:
+    """Return how axes are pulled to their nominal motions, with as many numbers as there must be."""
+    tracking, budget = plan.axis_tracking, plan.budget
+    if tracking is None:
+        raise RefusalError("axis_tracking", "is missing, but the plan has a budget")
+    needed = plan.start.size - 2 if budget is not None and budget.clock_error else 0
+    for name in ("rate", "acceleration"):
+        if len(getattr(tracking, name)) != needed:
+            found = f"has {len(getattr(tracking, name))} numbers, not {needed}"
+            raise RefusalError(f"axis_tracking.{name}", found)
+    return tracking
 
 
 def _coupling(plan: Plan, tree: ComponentTree | None) -> FloatArray:
@@ -122,7 +134,9 @@ class _Motion(NamedTuple):
     leaving: int
 
 
-def _check_departures(transition: Transition, motion: _Motion, away: FloatArray, where: str) -> None:
+def _check_departures(
+    transition: Transition, motion: _Motion, away: FloatArray, tracking: AxisTracking, where: str
+) -> None:
     """Check how far axes and their rates may depart from their nominal motions, and what this leaves."""
     stated, gains = transition.tolerance, transition.gains
     assert stated is not None  # checked by the caller
@@ -132,10 +146,14 @@ def _check_departures(transition: Transition, motion: _Motion, away: FloatArray,
     if not (stated.distance > 0.0).all():
         raise RefusalError(where, "an axis may leave its funnel")
     most, limits = gains.acceleration_limit, gains.rate_limit
-    if most is not None and not (stated.acceleration + away[:, 2].max(axis=0) <= most).all():
+    pushed, fastest = stated.acceleration + away[:, 2].max(axis=0), motion.moving[:, 1] + away[:, 1]
+    if most is not None and not (pushed <= most).all():
         raise RefusalError(where, "an axis may exceed its limit of acceleration")
-    if limits is not None and not ((motion.moving[:, 1] + away[:, 1]).max(axis=0) <= limits).all():
+    if limits is not None and not (fastest.max(axis=0) <= limits).all():
         raise RefusalError(where, "an axis may be faster than its limit")
+    if tracking.rate:
+        _require(np.array(tracking.rate), fastest.max(axis=0), False, "axis_tracking.rate")
+        _require(np.array(tracking.acceleration), pushed, False, "axis_tracking.acceleration")
 
 
 def _start(plan: Plan) -> FloatArray:

@@ -68,20 +68,42 @@ def position_bounds(tube: PositionTube, stiffness: float, damping: float, budget
     errors = budget.model_error * (np.arange(1, 2 * parts, 2) / parts - 1.0)
     sums = _sums(tube, oscillator(stiffness, damping, budget.period), stiffness, damping, budget, errors)
     noise = tube.tracking_stiffness * budget.position_noise + tube.tracking_damping * budget.velocity_noise
-    quiet = noise * sums[COMMAND, :3] + budget.acceleration_error * sums[KICK, :3]
-    moving = quiet + tube.speed * sums[STEP, :3]
-    nominal, gain = tube.speed * sums[STEP, 3], 1.0 - rest * sums[KICK, 2]
+    gain, nominal = 1.0 - rest * sums[KICK, 2], tube.speed * sums[STEP, 3]
     if not (gain > 0.0).all():
         raise RefusalError("tube", "the error of the model may exceed what the loop makes up for")
-    command, settled = (moving[2] + noise + nominal) / gain, (quiet[2] + noise) / gain
-    off, fast = moving[:2] + rest * command * sums[KICK, :2]
-    relative = (1.0 + budget.model_error) * command + nominal + budget.acceleration_error
-    off += budget.period**2 / 8.0 * relative
-    fast += budget.period / 2.0 * relative
-    still = quiet[0] + rest * settled * sums[KICK, 0] + budget.period**2 / 8.0 * relative
-    speed = tube.speed * sums[STEP, 4] + fast + budget.period / 2.0 * nominal
-    single = command + (budget.single_noise - 1.0) * noise  # of one robot, not of their mean
-    return np.array([value.max() for value in (off, fast, speed, still, single)])
+
+    def bounds(wrong: FloatArray, speed: float) -> FloatArray:
+        """Return |e| at samples, |e'|, |p'|, |u| and |p''|, shape (5, parts)."""
+        entering = wrong * sums[COMMAND, :3] + budget.acceleration_error * sums[KICK, :3]
+        entering = entering + speed * sums[STEP, :3]
+        asked = (entering[2] + wrong + speed * sums[STEP, 3]) / gain
+        off, fast = entering[:2] + rest * asked * sums[KICK, :2]
+        pushed = (1.0 + budget.model_error) * asked + budget.acceleration_error
+        fast = fast + budget.period / 2.0 * (pushed + speed * sums[STEP, 3])
+        quick = speed * sums[STEP, 4] + fast + budget.period / 2.0 * speed * sums[STEP, 3]
+        return np.array([off, fast, quick, asked, pushed])
+
+    def settled(speed: float) -> FloatArray:
+        """Return the bounds where measurements are of wrong instants, too, by which commands are wrong."""
+        least, unit = (bounds(np.full(len(errors), one), speed) for one in (0.0, 1.0))  # both are straight
+        caused = (
+            2.0
+            * budget.clock_error
+            * np.array(
+                [
+                    tube.tracking_stiffness * one[2] + tube.tracking_damping * one[4]
+                    for one in (least, unit - least)
+                ]
+            )
+        )
+        if not (caused[1] < 1.0).all():
+            raise RefusalError("budget.clock_error", "the loop does not make up for such an error of clocks")
+        return bounds((noise + caused[0]) / (1.0 - caused[1]), speed)
+
+    off, fast, quick, asked, pushed = settled(tube.speed)
+    between = budget.period**2 / 8.0 * (pushed + nominal)
+    still, single = settled(0.0)[0] + between, asked + (budget.single_noise - 1.0) * noise  # of one robot
+    return np.array([value.max() for value in (off + between, fast, quick, still, single)])
 
 
 def may_rest(tube: PositionTube, stiffness: float, damping: float, budget: Budget, rate: float) -> bool:

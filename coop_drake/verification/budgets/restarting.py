@@ -45,7 +45,8 @@ def check_restart(plan: Plan, tree: ComponentTree) -> Check | None:
     gains = plan.transitions[0].gains
     if plan.tube is None or not may_rest(plan.tube, gains.stiffness, gains.damping, budget, stated.rest_rate):
         raise RefusalError("restart.rest_rate", "the object's tube does not hold from rests with such a rate")
-    loop, terms = loop_of(plan.axis_tracking, budget), np.zeros((len(plan.cells), axes, axes, axes))
+    tracking, terms = plan.axis_tracking, np.zeros((len(plan.cells), axes, axes, axes))
+    loop = loop_of(tracking, budget)
     if budget.bodies:
         terms = couplings(budget, tree, plan.cells).rates[:, 1:]
     if stated.rest_rate < RESTING:
@@ -75,6 +76,12 @@ def check_restart(plan: Plan, tree: ComponentTree) -> Check | None:
         most = plan.transitions[k].gains.acceleration_limit
         if most is not None and not (stated.acceleration + push <= most).all():
             raise RefusalError("restart.acceleration", f"in cell {k} an axis may exceed its limit")
+        if tracking.rate and not (stated.rate + fast <= tracking.rate).all():
+            raise RefusalError(
+                "restart.rate", f"in cell {k} an axis may be faster than wrong ages count with"
+            )
+        if tracking.acceleration and not (stated.acceleration + push <= tracking.acceleration).all():
+            raise RefusalError("restart.acceleration", f"in cell {k} wrong ages count with less")
         least = min(least, float((0.5 * (cell.upper - cell.lower) - own).min()))
     efforts, limits = efforts_asked(plan, tree, every) if budget.limited else ([], np.zeros(0))
     if not all((one <= limits).all() for one in efforts):
