@@ -120,10 +120,12 @@ A world is the server of the channels of measurements and of efforts, with `Hell
 - **Stamps** are the times, by the same clock, at which the pose and the state were measured: measurements
   that are handed out m periods later have stamps m periods before `time`, and those of the first m samples
   have 0. Under a budget a robot compares them at every step. A measurement that is older or younger than it
-  takes it for, by the delay of the scenario in whole periods, or older than the budget's delay, a stamp
-  that goes back, and a clock that jumps let it ask for a hold, and after {LONGEST_DOUBT:g} s let the drives
-  brake. Drives take no effort whose `stamp` is in the future of its sample, or older by more than
-  {TOLERATED:g} s than the budget's delay.
+  takes it for, by the delay of the scenario in whole periods and more than the budget's `clock_error`, or
+  with this error older than the budget allows, a pose and a state of different instants, a stamp that goes
+  back, and a clock that jumps let it ask for a hold, and after {LONGEST_DOUBT:g} s let the drives brake.
+  Drives take no effort whose `stamp` is in the future of its sample, or older by more than {TOLERATED:g} s
+  than the budget's delay and twice its `clock_error`. Under a budget a robot computes for
+  number times period, whatever its clock shows.
 - **Efforts** act on the base at the origin of Bk as (force along x of W, force along y of W, torque about
   z), then on the joints in the order of q_k. They hold from the sample's time on until the next ones.
 - **Present** is the client's first message of every session, sent at once. It need not be sent again; the

@@ -16,6 +16,7 @@ from coop_drake.nodes.stamps import StampCheck, certified_age
 from coop_drake.scenario import Measurements
 from tests.nodes.test_sample_exchange import MEASURED, PERIOD, Team
 from tests.nodes.test_stops_under_a_budget import transport  # noqa: F401
+from tests.support.same_runs import differences
 from tests.support.sampled_team import sampled
 from tests.support.small_loop import small_maps
 
@@ -145,6 +146,29 @@ def test_a_clock_that_is_more_wrong_than_the_plan_allows_is_seen_at_once(transpo
     assert not log.reached
     assert log.times[-1] < 0.2
     assert "lets the drives brake" in log.violation
+
+
+class Hurried(DirectExchange):
+    """Robot 1 has a clock that is ahead of the others'."""
+
+    def _computed(self, time, measured, stamps):
+        own = self.robots[1]
+        right, own.step = own.step, lambda now, *args, **more: right(now + 1e-4, *args, **more)
+        try:
+            return super()._computed(time, measured, stamps)
+        finally:
+            own.step = right
+
+
+def test_a_clock_that_is_wrong_within_the_budget_changes_no_nominal_motion(transport):  # noqa: F811
+    scenario, plan, maps, _ = transport
+    scenario = replace(scenario, simulator=replace(scenario.simulator, max_time=1.0))
+    allowed = replace(plan, budget=replace(plan.budget, clock_error=2e-4))
+    logs = [simulate_apart(scenario, allowed, maps, exchange=one()) for one in (DirectExchange, Hurried)]
+    assert logs[0].times[-1] == pytest.approx(1.0)
+    assert differences(*logs) == []
+    seen = simulate_apart(scenario, plan, maps, exchange=Hurried())
+    assert seen.times[-1] < 0.2
 
 
 def test_drives_take_no_effort_that_rests_on_measurements_of_the_future_or_of_long_ago():

@@ -49,6 +49,18 @@ def test_the_budget_of_a_preset(tmp_path):
     assert 1.5 < levers < 2.0  # the base's velocity, its yaw about 1.2 m away, the elbow 0.8 m away
 
 
+def test_a_budget_counts_the_error_of_clocks_and_not_the_clocks_of_single_robots(tmp_path):
+    found = coop_drake.load_scenario(scenario(tmp_path, clock_error=2e-4))
+    assert budget_of("all", found, planning_problem(found)).clock_error == 2e-4
+    assert found.deployment.command_age == pytest.approx(0.0177)
+    alone = coop_drake.load_scenario(scenario(tmp_path, robots={"robot_0": {"clock_error": 1e-4}}))
+    with pytest.raises(ScenarioError, match=r"deployment\.robots"):
+        budget_of("all", alone, planning_problem(alone))
+    file = write_scenario(tmp_path / "without.scenario.yaml", deployment={"clock_error": 1e-3})
+    with pytest.raises(ScenarioError, match=r"0 without deployment\.control_rate"):
+        planning_problem(coop_drake.load_scenario(file))
+
+
 def test_a_budget_counts_bounded_errors_with_their_worst_signs(tmp_path):
     waves = {name: {"size": 0.001 * (1 + i)} for i, name in enumerate(("x", "y", "angle", "joints"))}
     waves |= {"velocity_x": {"size": 0.01}, "turn_rate": {"size": 0.02}, "joint_rates": {"size": 0.03}}

@@ -17,7 +17,7 @@ from coop_drake.laws.gains import IDEAL_AGE, RestCondition
 from coop_drake.planning.budget.alarms import axis_noises
 from coop_drake.planning.budget.axis_departure import SLACK, AxisLoop, best_loop
 from coop_drake.planning.budget.coupling import TeamCouplings, team_couplings
-from coop_drake.planning.budget.restarting import with_restart
+from coop_drake.planning.budget.restarting import reached_at_restart, with_restart
 from coop_drake.planning.budget.transitions import (
     LimitedEfforts,
     ProvedTransition,
@@ -86,7 +86,7 @@ def fit_budget(
         )
         if isinstance(found, UnprovedTransition):
             return found
-        faster = _faster(found, loop)
+        faster = _faster(found, loop, couplings.rates[:, 1:])
         if faster is None:
             break
         loop = replace(loop, tracking=faster)
@@ -100,14 +100,15 @@ def fit_budget(
     return with_restart(fitted_plan, loop, couplings.rates[:, 1:], limited)
 
 
-def _faster(found: Sequence[ProvedTransition], loop: AxisLoop) -> AxisTracking | None:
+def _faster(found: Sequence[ProvedTransition], loop: AxisLoop, couplings: FloatArray) -> AxisTracking | None:
     """Return larger rates and accelerations of axes that wrong ages shall count with; None if these are none.
 
-    Departures grow with them, and they with departures.
+    Departures grow with them, and they with departures. Those of beginning a cell anew are among them.
     """
     if not loop.budget.clock_error:
         return None
     reached, known = np.max([one.reached for one in found], axis=0), np.zeros((2, len(found[0].sets)))
+    reached = np.maximum(reached, reached_at_restart(loop, couplings))
     if loop.tracking.rate:
         known[:] = loop.tracking.rate, loop.tracking.acceleration
     if (reached <= known).all():

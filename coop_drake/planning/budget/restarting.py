@@ -71,6 +71,15 @@ def with_restart(plan: Plan, loop: AxisLoop, couplings: FloatArray, limited: Lim
     return plan
 
 
+def reached_at_restart(loop: AxisLoop, couplings: FloatArray) -> FloatArray:
+    """Return the largest rates and accelerations of axes on the usual slow way, shape (2, axes)."""
+    _, fast, push = _resting(loop)
+    every = [moving_evenly(loop, coupling, (ACCELERATION, RATE)) for coupling in couplings]
+    reached = np.array([[RATE + one.rate + fast, ACCELERATION + one.acceleration + push] for one in every])
+    most: FloatArray = (1.0 + OTHERWISE) * reached.max(axis=0)
+    return most
+
+
 def _efforts_kept(
     limited: LimitedEfforts, budget: Budget, moving: tuple[float, float], pulls: FloatArray
 ) -> list[bool]:
