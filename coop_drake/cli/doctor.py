@@ -149,7 +149,7 @@ def _scenarios() -> Finding:
 
 
 def _meshcat() -> Finding:
-    from coop_drake.viz.server import silent_meshcat
+    from coop_drake.viz.recording import silent_meshcat
 
     return Finding("Meshcat", f"opens port {silent_meshcat().port()}")
 

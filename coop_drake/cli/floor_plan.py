@@ -118,7 +118,7 @@ def _tell(plan: FloorPlan, file: Path, reporter: Reporter) -> None:
 def _write(plan: FloorPlan, file: Path, target: Path, inside: tuple[float, float] | None) -> None:
     from coop_drake.files import write_atomically
     from coop_drake.floor_plans import save_picture
-    from coop_drake.floor_plans.section import workspace_section
+    from coop_drake.floor_plans.settings import workspace_section
 
     if target.suffix.lower() in _PICTURES:
         save_picture(plan, target, file.name, inside)

@@ -265,7 +265,7 @@ def live_page(
         yield None
         return
     from coop_drake.viz import LivePage
-    from coop_drake.viz.server import silent_meshcat
+    from coop_drake.viz.recording import silent_meshcat
 
     with LivePage(task.scenario, plan, silent_meshcat(), facts=lambda: reporter.facts) as page:
         reporter.facts["live_url"] = page.url

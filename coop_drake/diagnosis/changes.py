@@ -1,9 +1,10 @@
-"""Builds changed copies of a team: with smaller bodies, or with wider joint limits."""
+"""Changes of the team or of the goal that would help."""
 
 from __future__ import annotations
 
-from collections.abc import Collection
-from dataclasses import replace
+from collections.abc import Callable, Collection
+from dataclasses import dataclass, replace
+from functools import partial
 from itertools import pairwise
 from math import pi
 
@@ -12,8 +13,19 @@ import shapely
 from shapely import Polygon
 from shapely.geometry.base import BaseGeometry
 
+from coop_drake.answers import PlanningProblem
+from coop_drake.diagnosis.variants import Amounts, Answer, Bracket, BudgetedPlanner, Outcome, bracketed
+from coop_drake.planning.sampling.narrow_passages import (
+    Eased,
+    amount_needed,
+    are_free,
+    ease_less,
+    with_larger_least_clearance,
+)
 from coop_drake.tree.component_tree import Body, ComponentTree, ConvexShape, TreeJoint
 from coop_drake.tree.pose import FloatArray
+
+# Builds changed copies of a team: with smaller bodies, or with wider joint limits.
 
 SLIDE_PER_RADIAN = 0.25
 """Widening of a prismatic joint for every radian of a revolute one: the length of a short link [m/rad]."""
@@ -119,3 +131,181 @@ def _scaled(body: Body, factor: float) -> Body:
         for shape in body.shapes
     )
     return replace(body, shapes=shapes)
+
+
+# Smaller changes that are enough for a path near the one found: move the path, and prove it free again.
+
+FRACTIONS = (0.1, 0.25, 0.5)
+"""A proof is tried at these fractions of the way from the amount that a path needs to the amount that is
+known to be enough [-]."""
+
+ROUNDS = 4
+"""Paths that are moved and proved one after another [-]."""
+
+MOVES = 6
+"""Times that a stretch of a path is moved away from the walls [-]."""
+
+WINDOW = 40
+"""Samples on either side of a colliding stretch that are moved with it [-]."""
+
+NO_PROGRESS = 0.25
+"""Less than this fraction of the resolution is no progress [-]."""
+
+
+def least_change(
+    eased: Eased, amount: float, outcome: Outcome, planner: BudgetedPlanner, resolution: float
+) -> tuple[float, Outcome]:
+    """Look for a smaller change that is enough for a path near the one found with an amount.
+
+    ``resolution``: how closely the amount is looked for.
+
+    Returns:
+        The smallest amount with which such a path was proved free, and its outcome.
+    """
+    least = NO_PROGRESS * resolution
+    for _ in range(ROUNDS):
+        if outcome.path is None or amount <= resolution:
+            break
+        path, needed = ease_less(eased, outcome.path, amount, least)
+        for fraction in FRACTIONS:
+            less = needed + fraction * (amount - needed)
+            if amount - less > least:
+                proved = planner.prove(eased(less), path)
+                if proved.answer is Answer.FOUND:
+                    amount, outcome = less, proved
+                    break
+        else:
+            break
+    return amount, outcome
+
+
+def clear_elsewhere(eased: Eased, path: FloatArray, enough: float) -> FloatArray:
+    """Move a path off the walls wherever it need not leave the floor; the place where it leaves most stays.
+
+    The path, shape (m, 3 + n), is free with the walls moved back by the amount ``enough`` [m].
+    """
+    floor = eased(0.0)
+    _, worst = amount_needed(eased, path, enough)
+    for rows in _blocked_runs(floor, path):
+        if rows[0] <= worst <= rows[-1]:
+            continue
+        first, last = max(0, rows[0] - WINDOW), min(len(path) - 1, rows[-1] + WINDOW)
+        first, last = (max(first, worst + 1), last) if worst < rows[0] else (first, min(last, worst - 1))
+        if last - first < 2:
+            continue
+        here, ends = slice(first, last + 1), last == len(path) - 1
+        for number in range(MOVES):
+            needed, _ = amount_needed(eased, path[here], enough)
+            part = with_larger_least_clearance(eased(needed), path[here], number, free_end=ends)
+            if amount_needed(eased, part, enough)[0] <= needed:
+                path = np.concatenate((path[:first], part, path[last + 1 :]))
+            if are_free(floor, path[here]).all():
+                break
+    return path
+
+
+def _blocked_runs(problem: PlanningProblem, path: FloatArray) -> list[tuple[int, int]]:
+    """First and last rows of the runs of samples that are not free."""
+    free = are_free(problem, path)
+    edges = np.flatnonzero(np.diff(np.concatenate(([1], free.astype(np.int8), [1]))))
+    return [(int(a), int(b) - 1) for a, b in zip(edges[::2], edges[1::2], strict=True)]
+
+
+# Changes to the team that may make a problem feasible, each alone and by as little as is found enough.
+
+MOST_SHRINKAGE, SHRINKAGE_RESOLUTION = 0.7, 0.02
+"""Bodies are made smaller by up to this fraction of their size, looked for this closely [-]."""
+
+MOST_WIDENING, WIDENING_RESOLUTION = pi / 2, 0.05
+"""Joint ranges are widened by up to this at either limit, looked for this closely [rad]."""
+
+ASKED = 5
+"""Amounts of one change that are tried at most [-]."""
+
+
+@dataclass(frozen=True)
+class TeamChange:
+    """One kind of change to the team.
+
+    Attributes:
+        name: What it is called.
+        unit: Unit of its amounts: ``share``, a fraction of all lengths of a body, or ``rad`` at either limit.
+        tree: The team with an amount of the change.
+        most: Largest amount tried.
+        resolution: How closely the least amount is looked for.
+        monotone: Whether what is free for an amount is free for every larger one.
+    """
+
+    name: str
+    unit: str
+    tree: Callable[[float], ComponentTree]
+    most: float
+    resolution: float
+    monotone: bool = True
+
+
+@dataclass(frozen=True)
+class Relaxation:
+    """What was computed about one change alone.
+
+    Attributes:
+        change: The change.
+        bracket: Amounts proved not to be enough and found to be enough.
+    """
+
+    change: TeamChange
+    bracket: Bracket
+
+    @property
+    def never_enough(self) -> bool:
+        """Whether no amount up to the largest tried is enough, proved."""
+        return self.change.monotone and self.bracket.is_refuted
+
+
+def changes(tree: ComponentTree) -> list[TeamChange]:
+    """The changes that make sense for a team."""
+
+    def shrinking(name: str, bodies: frozenset[str]) -> TeamChange:
+        return TeamChange(
+            name,
+            "share",
+            lambda amount: shrunk_bodies(tree, bodies, 1.0 - amount),
+            MOST_SHRINKAGE,
+            SHRINKAGE_RESOLUTION,
+            shrink_into_themselves(tree, bodies),
+        )
+
+    kinds = (("smaller bases", base_bodies(tree)), ("smaller object", object_bodies(tree)))
+    listed = [shrinking(name, bodies) for name, bodies in kinds if bodies]
+    if not all(joint.circular for joint in tree.joints):
+        name, wider = "wider joint range", partial(widened_joints, tree)
+        listed.append(TeamChange(name, "rad", wider, MOST_WIDENING, WIDENING_RESOLUTION))
+    return listed
+
+
+def try_changes(problem: PlanningProblem, planner: BudgetedPlanner, *, refuted: bool) -> list[Relaxation]:
+    """Bracket every change alone; the largest amount comes first, as most changes do not help at all.
+
+    ``refuted``: whether the problem was proved infeasible as it is.
+    """
+    return [
+        Relaxation(change, _bracket(problem, change, planner, 0.0 if refuted else None))
+        for change in changes(problem.tree)
+    ]
+
+
+def _bracket(
+    problem: PlanningProblem, change: TeamChange, planner: BudgetedPlanner, refuted: float | None
+) -> Bracket:
+    def eased(amount: float) -> PlanningProblem:
+        return replace(problem, tree=change.tree(amount))
+
+    def improve(amount: float, outcome: Outcome) -> tuple[float, Outcome]:
+        return least_change(eased, amount, outcome, planner, change.resolution)
+
+    return bracketed(
+        lambda amount: planner.ask(eased(amount), change.name),
+        Amounts(change.most, change.most, change.resolution, asked=ASKED),
+        refuted=refuted,
+        improve=improve,
+    )

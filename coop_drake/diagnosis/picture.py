@@ -10,8 +10,8 @@ from matplotlib.patches import Circle
 from shapely import Point
 
 from coop_drake.answers import PlanningProblem
-from coop_drake.diagnosis.findings import Diagnosis
-from coop_drake.diagnosis.passages import BlockingPassage
+from coop_drake.diagnosis.diagnosing import Diagnosis
+from coop_drake.diagnosis.widening import BlockingPassage
 from coop_drake.drawing import draw_polygon, draw_workspace, new_figure, team_footprints
 from coop_drake.drawing.colours import AT_FAULT, BLUE, GREY, INK, NOT_AT_FAULT, OUTSIDE, PAPER, WALL
 from coop_drake.geometry.parts import parts_of

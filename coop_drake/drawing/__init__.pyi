@@ -1,9 +1,8 @@
-from .camera import camera_pose
 from .canvas import house_style, legend_above, new_figure, save_figure
-from .floor import draw_polygon, draw_team, draw_workspace, team_legend
-from .footprints import BodyFootprint, team_footprints
+from .floor import BodyFootprint, draw_polygon, draw_team, draw_workspace, team_footprints, team_legend
 from .solids import (
     TriangleMesh,
+    camera_pose,
     extruded_section,
     flat_mesh,
     joined,

@@ -1,23 +1,57 @@
-"""Drawing the floor plan and the team on it."""
+"""Floors and bodies on axes."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import PathCollection
 from matplotlib.colors import to_rgba_array
 from matplotlib.patches import Patch, PathPatch
 from matplotlib.path import Path as Outline
-from shapely import Polygon, box, get_coordinates
+from shapely import MultiPoint, Polygon, box, get_coordinates, union_all
 from shapely.geometry.base import BaseGeometry
 from shapely.geometry.polygon import orient
 
 from coop_drake.drawing.colours import FLOOR, INK, OBJECT, WALL, robot_colour
-from coop_drake.drawing.footprints import team_footprints
 from coop_drake.tree.component_tree import ComponentTree
 from coop_drake.tree.pose import FloatArray
+
+# Footprints of the team on the floor at one configuration.
+
+
+@dataclass(frozen=True)
+class BodyFootprint:
+    """Where one body stands.
+
+    Attributes:
+        name: Scoped name of the body.
+        robot: Index of its robot, None for the object.
+        shape: Its projection to the floor, in W [m].
+    """
+
+    name: str
+    robot: int | None
+    shape: BaseGeometry
+
+
+def team_footprints(tree: ComponentTree, configuration: FloatArray) -> list[BodyFootprint]:
+    """Return the footprint of every body at z = (x, y, theta, q...), shape (3 + n,), the object's first."""
+    footprints = []
+    for component, X_WC in zip(tree.components, tree.poses(configuration), strict=True):
+        for body in component.bodies:
+            hulls = [
+                MultiPoint(X_WC.apply(np.atleast_2d(shape.vertices))).convex_hull.buffer(shape.radius)
+                for shape in body.shapes
+            ]
+            footprints.append(BodyFootprint(body.name, body.robot, union_all(hulls)))
+    return sorted(footprints, key=lambda footprint: footprint.robot is not None)
+
+
+# Drawing the floor plan and the team on it.
 
 _RIM = 0.3
 """Width of the wall drawn around the floor [m]."""

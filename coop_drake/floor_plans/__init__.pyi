@@ -1,6 +1,5 @@
-from .formats import SUFFIXES
 from .picture import save_picture
-from .plan import FloorPlan, excess, read_floor_plan
+from .plan import SUFFIXES, FloorPlan, excess, read_floor_plan
 from .rooms import Inside
 from .settings import UNITS, FloorPlanSettings
 

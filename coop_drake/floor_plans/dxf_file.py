@@ -13,9 +13,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from coop_drake.errors import FloorPlanError
-from coop_drake.floor_plans.curves import flatten
 from coop_drake.floor_plans.settings import FloorPlanSettings
-from coop_drake.floor_plans.walls import Drawing, Wall, refuse_many
+from coop_drake.floor_plans.walls import Drawing, Wall, flatten, refuse_many
 
 _UNITS = {1: 0.0254, 2: 0.3048, 4: 1e-3, 5: 1e-2, 6: 1.0, 7: 1e3, 10: 0.9144, 14: 1e-1}
 """Units that a floor plan may have, by their codes in $INSUNITS [m]."""

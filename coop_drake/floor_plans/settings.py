@@ -1,4 +1,4 @@
-"""Settings for reading a drawing or a map."""
+"""Settings with which a floor plan is read, and the lines for a scenario."""
 
 from __future__ import annotations
 
@@ -6,8 +6,14 @@ from dataclasses import dataclass
 from math import inf
 from typing import Annotated, Literal
 
+from shapely import Polygon
+
 from coop_drake.errors import FloorPlanError
+from coop_drake.geometry.parts import corners_of
+from coop_drake.tree.pose import FloatArray
 from coop_drake.typed_data import DataError, Limits, check_fields
+
+# Settings for reading a drawing or a map.
 
 Unit = Literal["mm", "cm", "dm", "m", "km", "in", "ft", "yd"]
 UNITS: dict[Unit, float] = {
@@ -85,3 +91,42 @@ class FloorPlanSettings:
         if not 0.0 < unit < inf:
             raise FloorPlanError(file, "unit", f"a unit of {unit:g} m is not allowed", "name the unit")
         return unit * self.scale
+
+
+# Writes a floor as the section ``workspace`` of a scenario file.
+
+_DECIMALS = 9
+"""Decimals of a metre that are written."""
+_WIDTH = 100
+"""Longest line [characters]."""
+
+
+def workspace_section(floor: Polygon, comment: str) -> str:
+    """YAML text of a floor's rings, rounded to a nanometre, below a comment of one line."""
+    outer, *holes = (_ring(corners) for corners in corners_of(floor))
+    lines = [f"# {' '.join(comment.split())}", "workspace:", "  outer: [", *_indented(outer, 4), "  ]"]
+    if holes:
+        lines.append("  holes:")
+    for hole in holes:
+        lines += ["  - [", *_indented(hole, 4), "  ]"]
+    return "\n".join(lines) + "\n"
+
+
+def _ring(corners: FloatArray) -> list[str]:
+    return [f"[{_number(x)}, {_number(y)}]," for x, y in (corners.round(_DECIMALS) + 0.0).tolist()]
+
+
+def _number(value: float) -> str:
+    """A decimal number with a point and no exponent, which YAML 1.1 could read as text."""
+    text = f"{value:.{_DECIMALS}f}".rstrip("0")
+    return text + "0" if text.endswith(".") else text
+
+
+def _indented(words: list[str], indent: int) -> list[str]:
+    """Words joined to lines of at most ``_WIDTH`` characters."""
+    lines = [""]
+    for word in words:
+        if lines[-1] and len(lines[-1]) + len(word) + 1 > _WIDTH - indent:
+            lines.append("")
+        lines[-1] += f" {word}" if lines[-1] else word
+    return [" " * indent + line for line in lines]

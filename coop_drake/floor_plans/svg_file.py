@@ -16,21 +16,24 @@ from shapely import Polygon
 from shapely.geometry.base import BaseGeometry
 
 from coop_drake.errors import FloorPlanError
-from coop_drake.floor_plans.curves import flatten
 from coop_drake.floor_plans.settings import FloorPlanSettings
-from coop_drake.floor_plans.svg_page import (
+from coop_drake.floor_plans.svg_style import (
+    INITIAL,
     LABEL,
     NUMBER,
     SVG,
+    Cascade,
     SvgPage,
+    Values,
     length,
     name_of,
     numbers,
+    opacity,
+    paints,
     read_svg_page,
     view_box,
 )
-from coop_drake.floor_plans.svg_style import INITIAL, Cascade, Values, opacity, paints
-from coop_drake.floor_plans.walls import Drawing, Wall, refuse_many
+from coop_drake.floor_plans.walls import Drawing, Wall, flatten, refuse_many
 from coop_drake.tree.pose import FloatArray
 
 if TYPE_CHECKING:

@@ -1,11 +1,9 @@
 from .block_diagram import block_diagram_figure
-from .figures import write_figures
+from .figures import angle_figure, summary_figure, write_figures
 from .floor_figures import path_figure
-from .live import LiveView
-from .live_page import LivePage
+from .live import LivePage, LiveView
 from .recording import inline_frame, recording_html, write_recording
 from .scene import TransportScene
-from .time_figures import angle_figure, summary_figure
 
 __all__ = [
     "LivePage",

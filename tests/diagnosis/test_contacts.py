@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 from shapely import box
 
-from coop_drake.diagnosis.contacts import contacts, deepest, overlaps
-from coop_drake.diagnosis.gap import narrowest_gap
+from coop_drake.diagnosis.contacts import contacts, deepest, narrowest_gap, overlaps
 from coop_drake.tree.component_tree import Body, Component, ComponentTree, TreeJoint
 from coop_drake.tree.pose import PlanarPose
 from tests.support.cases import disc, rectangle, team_tree

@@ -4,7 +4,7 @@ import numpy as np
 from shapely import Polygon, box
 
 from coop_drake.answers.problem import PlanningProblem
-from coop_drake.diagnosis.paths import is_free
+from coop_drake.diagnosis.variants import is_free
 from tests.support.cases import team_tree
 
 PILLAR = box(4.0, 4.0, 9.0, 9.0)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from shapely import box
 
-from coop_drake.drawing.camera import camera_pose
+from coop_drake.drawing.solids import camera_pose
 
 
 @pytest.mark.parametrize("turn", [0.0, 0.7])

@@ -12,8 +12,7 @@ from shapely import Point, affinity, box, contains_xy, union_all
 
 from coop_drake.errors import FloorPlanError
 from coop_drake.floor_plans import FloorPlanSettings, Inside, excess, read_floor_plan
-from coop_drake.floor_plans.cells import room_of_map
-from coop_drake.floor_plans.map_file import OccupancyMap
+from coop_drake.floor_plans.map_file import OccupancyMap, room_of_map
 from tests.support.floor_plan_files import room_shades, write_map
 
 EXACT = FloorPlanSettings(tolerance=0.0)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from coop_drake.viz.animation_tracks import kept_frames
+from coop_drake.viz.recording import kept_frames
 
 FRAMES = np.linspace(0.0, 1.0, 400)
 

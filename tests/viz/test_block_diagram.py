@@ -4,8 +4,7 @@ import pytest
 from matplotlib.patches import FancyBboxPatch
 
 from coop_drake.diagram import TELEMETRY
-from coop_drake.viz.block_diagram import block_diagram_figure
-from coop_drake.viz.signal_flow import INPUTS, OUTPUTS, signal_flow
+from coop_drake.viz.block_diagram import INPUTS, OUTPUTS, block_diagram_figure, signal_flow
 from tests.support.small_loop import small_loop
 
 

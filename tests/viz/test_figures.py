@@ -14,10 +14,16 @@ from coop_drake.answers.speeds import base_speeds
 from coop_drake.drawing.canvas import house_style, picture_of
 from coop_drake.drawing.colours import INK, OBJECT, robot_colour
 from coop_drake.viz import write_figures
-from coop_drake.viz.figures import RunFigures
+from coop_drake.viz.figures import (
+    RunFigures,
+    TimeAxes,
+    angle_figure,
+    break_at_switches,
+    joints_figure,
+    position_figure,
+    summary_figure,
+)
 from coop_drake.viz.floor_figures import path_figure, start_and_goal_figure
-from coop_drake.viz.time_axes import TimeAxes, break_at_switches
-from coop_drake.viz.time_figures import angle_figure, joints_figure, position_figure, summary_figure
 from tests.support.cases import case
 from tests.support.figure_names import OF_EVERY_RUN, OF_TWO_ROBOTS
 from tests.support.sliding import with_sliding_joint

@@ -17,7 +17,7 @@ from pydrake.geometry import Meshcat
 
 from coop_drake.scenario import load_scenario
 from coop_drake.viz import LivePage
-from coop_drake.viz.live_page import stop_words
+from coop_drake.viz.live import stop_words
 from tests.support.cases import case
 from tests.support.synthetic_log import synthetic_log, synthetic_plan
 

@@ -13,7 +13,7 @@ from pydrake.geometry import Rgba
 from coop_drake.errors import CoopDrakeError
 from coop_drake.scenario import load_scenario
 from coop_drake.viz import inline_frame, recording_html, write_recording
-from coop_drake.viz.overlay import page_content, with_overlay
+from coop_drake.viz.recording import page_content, with_overlay
 from tests.support.cases import case
 from tests.support.recorded import messages, paths, played, track
 from tests.support.synthetic_log import synthetic_log, synthetic_plan

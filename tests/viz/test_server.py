@@ -8,7 +8,7 @@ import socket
 import pytest
 from pydrake.geometry import Meshcat
 
-from coop_drake.viz.server import silent_meshcat
+from coop_drake.viz.recording import silent_meshcat
 
 
 @pytest.fixture

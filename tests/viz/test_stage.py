@@ -6,7 +6,7 @@ import pytest
 from pydrake.geometry import Meshcat
 from shapely import Polygon, box
 
-from coop_drake.viz.stage import set_stage
+from coop_drake.viz.scene import set_stage
 
 FLOOR = box(0, 0, 6, 5)
 SHELF, PILLAR = Polygon([(1, 1), (3, 1.5), (2.9, 1.9), (0.9, 1.4)]), box(4, 3, 4.4, 3.3)

@@ -11,9 +11,7 @@ from pydrake.systems.framework import DiagramBuilder
 from coop_drake.drawing.colours import robot_colour
 from coop_drake.plant import build_team_plant
 from coop_drake.scenario import load_scenario
-from coop_drake.viz.paint import hex_colour
-from coop_drake.viz.team_colours import illustrations, paint_robots
-from coop_drake.viz.team_view import TeamView
+from coop_drake.viz.scene import TeamView, hex_colour, illustrations, paint_robots
 
 BASE = Path(__file__).parents[2] / "models" / "base.scenario.yaml"
 
