@@ -1,21 +1,29 @@
-"""What a robot in a process of its own costs: runs in lock-step beside the same runs in one process."""
+"""Processes of their own: what messages and robots cost, what killed and limp ones do, how stops end."""
 
 from __future__ import annotations
 
 import resource
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
+from math import inf
 from time import perf_counter
 
+import numpy as np
+
+from benchmarks.departures import deployment_of
 from benchmarks.ring_teams import ring_transport
 from benchmarks.rows import Row
 from benchmarks.tasks import Task
+from coop_drake import Found, Plan, load_scenario, plan
 from coop_drake.answers.log import SimulationLog
-from coop_drake.nodes import simulate_in_processes
+from coop_drake.diagram import control_period
+from coop_drake.errors import PlanError
+from coop_drake.harmonic_maps import HarmonicMap
+from coop_drake.nodes import DirectExchange, simulate_apart, simulate_in_processes
+from coop_drake.nodes.membership import Stop
 from coop_drake.scenario import Deployment, Scenario
-from coop_drake.simulation import Sample, simulate
-
-__all__ = ["apart_tasks", "costs"]
+from coop_drake.simulation import Sample, build_maps, simulate
 
 _TEAMS = (2, 4, 8)
 """Numbers of robots."""
@@ -81,3 +89,74 @@ def _measured(run: Callable[[Callable[[Sample], None]], SimulationLog]) -> Seque
 def _cpu(who: int) -> float:
     used = resource.getrusage(who)
     return used.ru_utime + used.ru_stime
+
+
+TEAMS = ("base", "three", "tight", "elbow")
+"""Shipped scenarios."""
+
+RUNS = 25
+"""Runs of every team [-]."""
+
+GAP = 0.5
+"""How long nobody gets a sample [s]."""
+
+TWICE = 2.5
+"""Longest time between two gaps of the same run [s]: the team brakes, rests or goes slowly then."""
+
+
+def stops_tasks() -> list[Task]:
+    """One team after the other."""
+    return [Task(f"apart/stops/{team}", partial(_rows, team)) for team in TEAMS]
+
+
+def _rows(team: str, _: Sequence[Row]) -> list[Row]:
+    ideal = load_scenario(team)
+    scenario = replace(ideal, deployment=deployment_of({"preset": "mobile_base", "budget": "all"}))
+    answer = plan(scenario)
+    if not isinstance(answer, Found):
+        raise PlanError(f"{scenario.path}: no plan to stop: {answer.reason}")
+    return stopped(f"apart/stops/{team}", scenario, answer.plan, build_maps(answer.plan), RUNS)
+
+
+def random_gaps(end: float, period: float, seed: int) -> list[tuple[int, int]]:
+    """Return one or two gaps, as ``DirectExchange`` takes them.
+
+    Args:
+        end: The first one begins before this time [s].
+        period: Control period [s].
+        seed: Of what is drawn.
+    """
+    generator = np.random.default_rng(seed)
+    begins = [generator.uniform(0.0, end)]
+    if seed % 3:
+        begins.append(begins[0] + GAP + generator.uniform(0.0, TWICE))
+    return [(round(begin / period), round((begin + GAP) / period)) for begin in begins]
+
+
+def stopped(name: str, scenario: Scenario, plan: Plan, maps: Sequence[HarmonicMap], runs: int) -> list[Row]:
+    """Count how runs with random stops end.
+
+    Args:
+        name: What the rows are called.
+        scenario: The scenario.
+        plan: Its plan.
+        maps: The harmonic map of every transition.
+        runs: Number of runs.
+    """
+    end = sum(transition.estimated_time for transition in plan.transitions)
+    found, arrived, nearest = list[Stop](), 0, inf
+    for seed in range(runs):
+        exchange = DirectExchange(random_gaps(end, control_period(scenario), seed))
+        log = simulate_apart(scenario, plan, maps, exchange=exchange)
+        arrived += log.reached and not log.violation
+        found += exchange.membership.stops
+        nearest = min(nearest, float(log.workspace_clearance.min()), float(log.body_clearance.min()))
+    figures = {
+        "runs": (runs, ""),
+        "arrived": (arrived, ""),
+        "stops": (len(found), ""),
+        "certified": (sum(stop.certified for stop in found), ""),
+        "goes_on_after": (max((stop.resumed or inf) - stop.since for stop in found), "s"),
+        "clearance": (1e3 * nearest, "mm"),
+    }
+    return [Row(f"{name}/{figure}", float(value), unit) for figure, (value, unit) in figures.items()]

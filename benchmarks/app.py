@@ -14,16 +14,14 @@ from typer.core import TyperGroup
 
 from benchmarks.adversaries.measured import adversary_tasks
 from benchmarks.alarms import alarm_tasks
-from benchmarks.apart import apart_tasks
+from benchmarks.apart import apart_tasks, stops_tasks
 from benchmarks.breaking import breaking_tasks
 from benchmarks.campaign_costs import campaign_tasks
-from benchmarks.commands import bench_commands
+from benchmarks.commands import bench_commands, starting_tasks
 from benchmarks.compiled_runs import compiled_tasks
-from benchmarks.contents import TOPICS, WHOLE, show_contents
 from benchmarks.departures import departure_tasks
 from benchmarks.deployed import deployed_tasks
 from benchmarks.isolated import WorkerError, in_own_process
-from benchmarks.ledger import Ledger, LedgerError
 from benchmarks.limp import limp_tasks
 from benchmarks.mapping import mapping_tasks
 from benchmarks.messages import message_tasks
@@ -31,20 +29,17 @@ from benchmarks.planner.ablation import ablation_tasks
 from benchmarks.planner.budgeted import budget_tasks
 from benchmarks.planner.contradiction import contradiction_tasks
 from benchmarks.planner.critical_width import critical_width_tasks
-from benchmarks.planner.growth import growth_tasks
-from benchmarks.planner.hard_questions import hard_question_tasks
+from benchmarks.planner.growth import growth_tasks, hard_question_tasks, team_tasks
 from benchmarks.planner.head_to_head import Effort, head_to_head_tasks
 from benchmarks.planner.ours import compile_kernels
 from benchmarks.planner.stages import stage_tasks
-from benchmarks.planner.teams import team_tasks
-from benchmarks.questions.ompl_peer import has_ompl
+from benchmarks.questions.peers import has_ompl
 from benchmarks.questions.question import random_question
 from benchmarks.rejoining import rejoining_tasks
+from benchmarks.rows import Ledger, LedgerError
 from benchmarks.simulating import simulating_tasks
-from benchmarks.starting import starting_tasks
-from benchmarks.stops import stops_tasks
 from benchmarks.study import Study, batches_of, load_study, make_study, show_results
-from benchmarks.table import show
+from benchmarks.table import TOPICS, WHOLE, show, show_contents
 from benchmarks.tasks import Task, chosen, worked
 from coop_drake.campaign.results import CampaignFolder
 from coop_drake.cli.reporter import ExitCode, reporting

@@ -14,8 +14,7 @@ from shapely import Point
 from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
 
 from benchmarks.domains import Domain
-from benchmarks.rows import Row
-from benchmarks.timing import best_seconds, seconds
+from benchmarks.rows import Row, best_seconds, seconds
 from coop_drake.errors import FieldError
 from coop_drake.harmonic_maps import HarmonicMap, solve
 

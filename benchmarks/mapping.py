@@ -10,9 +10,8 @@ import numpy as np
 
 from benchmarks.domains import Domain, hall_with_pillars, standard_domains, wavy_room
 from benchmarks.map_rows import ablation_rows, cost_rows, map_rows
-from benchmarks.rows import Row
+from benchmarks.rows import Row, best_seconds
 from benchmarks.tasks import Task
-from benchmarks.timing import best_seconds
 from benchmarks.transport import base_plan
 from coop_drake.answers import Plan
 from coop_drake.harmonic_maps import TOLERANCE, HarmonicMap, MapStore, VelocityField

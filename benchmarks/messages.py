@@ -8,9 +8,8 @@ from multiprocessing import get_context
 from multiprocessing.connection import Connection
 from time import perf_counter, process_time
 
-from benchmarks.rows import Row
+from benchmarks.rows import Row, best_seconds
 from benchmarks.tasks import Task
-from benchmarks.timing import best_seconds
 from coop_drake.errors import MessagingError
 from coop_drake.messages import (
     SUPERVISOR,

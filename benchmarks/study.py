@@ -14,15 +14,27 @@ from math import isnan
 from pathlib import Path
 from typing import Any
 
-from benchmarks.questions.record import QuestionRecord
+from benchmarks.questions.answering import QuestionRecord, question_batches
 from benchmarks.questions.settings import QuestionSettings
 from benchmarks.questions.summary import Questions, summarise_questions
-from benchmarks.questions.work import question_batches
-from benchmarks.searches.bisections import ends_shown, is_good, multiple_shown, sentences
-from benchmarks.searches.findings import BreakingPoint, Finding
-from benchmarks.searches.searching import Searching, SearchKind, search_batches, section_of
-from benchmarks.searches.settings import Breaking, Searches
-from benchmarks.searches.summary import sentence, summarise_searches
+from benchmarks.searches.findings import (
+    BreakingPoint,
+    Finding,
+    ends_shown,
+    is_good,
+    multiple_shown,
+    sentence,
+    sentences,
+    summarise_searches,
+)
+from benchmarks.searches.searching import (
+    Breaking,
+    Searches,
+    Searching,
+    SearchKind,
+    search_batches,
+    section_of,
+)
 from coop_drake.campaign.batches import Batch
 from coop_drake.campaign.results import CampaignFolder
 from coop_drake.campaign.running.command import Outcome, make_batches
@@ -196,7 +208,7 @@ def show_results(folder: CampaignFolder, batches: Sequence[Batch], reporter: Rep
         )
     write_atomically(folder.path / "study.json", json.dumps(facts, indent=1).encode() + b"\n")
     reporter.facts.update(facts)
-    for title, rows, headings, first in _tables(results):
+    for title, rows, headings, first in tables(results):
         reporter.table(title, rows, headings, first, padding=0)
     reporter.say(results.headline)
     reporter.say(f"All results are in {folder.path}")
@@ -204,15 +216,11 @@ def show_results(folder: CampaignFolder, batches: Sequence[Batch], reporter: Rep
         reporter.code = ExitCode.FAILED_RUN
 
 
-_Table = tuple[str, list[tuple[str, ...]], tuple[str, ...], str]
-"""Title, rows, headings, and the heading of the rows' names."""
-
-
 _ANSWERS = "asked", "plans", "beyond\nlimits", "no\nway", "un-\ndecided", "wrong"
 
 
-def _tables(results: Results) -> Iterator[_Table]:
-    """Yield what there is of questions, searches and bisections as tables of 80 columns."""
+def tables(results: Results) -> Iterator[tuple[str, list[tuple[str, ...]], tuple[str, ...], str]]:
+    """Yield title, rows, headings and the rows' own heading of what there is, in 80 columns."""
     if results.questions:
         yield (
             "questions",

@@ -5,9 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import partial
 
-from benchmarks.adversaries.bends import bend_question
-from benchmarks.adversaries.crossings import crossing_question, discs_in_a_corridor
-from benchmarks.adversaries.questions import random_question
+from benchmarks.adversaries.questions import (
+    bend_question,
+    crossing_question,
+    discs_in_a_corridor,
+    random_question,
+)
 from benchmarks.planner.family import corridor_problem
 from coop_drake.answers import PlanningProblem
 

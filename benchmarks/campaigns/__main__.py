@@ -1,7 +1,7 @@
 """``python -m benchmarks.campaigns``: makes campaigns and studies of this folder, and prints their tables.
 
 They take hours, at the lowest priority. What is there is kept: the same command goes on after an
-interruption. Tables are Markdown, as the documentation has them.
+interruption. Tables are Markdown.
 """
 
 from __future__ import annotations
@@ -16,9 +16,6 @@ from typing import Annotated
 import typer
 
 from benchmarks import study
-from benchmarks.questions.summary import seconds_shown
-from benchmarks.searches.bisections import multiple_shown
-from benchmarks.searches.summary import summarise_searches
 from coop_drake.campaign import load_campaign
 from coop_drake.campaign.report import Report, make_report
 from coop_drake.campaign.report.columns import MARGINS, SHARE
@@ -87,7 +84,10 @@ def _tables(file: Path, folder: CampaignFolder) -> Iterator[str]:
     if _is_study(file):
         batches = study.batches_of(study.load_study(file), folder)
         results = study.results_of(folder, batches)
-        tables = [_searches(results), _breaking(results), _questions(results)]
+        tables: list[Iterator[Line]] = [
+            iter([(first, *(heading.replace("\n", " ") for heading in headings)), *rows])
+            for _, rows, headings, first in study.tables(results)
+        ]
     else:
         campaign = load_campaign(file)
         batches = batches_of(campaign, folder)
@@ -116,51 +116,6 @@ def _runs(report: Report) -> Iterator[Line]:
         margins = (m.shown(least[m.name]) if m.name in least else "" for m in MARGINS)
         rate = group.rate
         yield group.scenario, group.tier, rate.runs, rate.lost, percent_up(rate.upper), *margins, used
-
-
-def _searches(results: study.Results) -> Iterator[Line]:
-    yield (
-        "searches",
-        "driven",
-        "number",
-        "runs",
-        "found a loss",
-        "not made",
-        "random",
-        "usual find",
-        "worst find",
-    )
-    for row in summarise_searches(results.findings):
-        ends = (f"{number:.4g}" for number in (row.before, row.typical, row.worst.worst))
-        yield row.scenario, row.margin, row.searches, row.runs, row.lost, row.failed, *ends
-
-
-def _breaking(results: study.Results) -> Iterator[Line]:
-    names = list(dict.fromkeys(point.scenario for point in results.points))
-    yield "largest multiple of what is certified without a loss", *names
-    for departure in dict.fromkeys(point.departure for point in results.points):
-        own = {point.scenario: point for point in results.points if point.departure == departure}
-        yield departure, *(multiple_shown(own.get(name)) for name in names)
-
-
-def _questions(results: study.Results) -> Iterator[Line]:
-    yield (
-        "questions",
-        "asked",
-        "plans",
-        "no way",
-        "undecided",
-        "wrong",
-        "a peer finds",
-        "median",
-        "95 %",
-        "largest",
-    )
-    for row in results.questions:
-        name = row.group if row.axis == row.group else f"{row.axis} {row.group}"
-        times = map(seconds_shown, (row.seconds.median, row.seconds.high, row.seconds.largest))
-        counts = row.count, row.plans, row.infeasible, row.undecided, row.wrong, row.peer_found
-        yield name, *counts, *times
 
 
 if __name__ == "__main__":

@@ -11,13 +11,9 @@ from dataclasses import dataclass
 from typing import Any
 
 from benchmarks.isolated import in_own_process
-from benchmarks.planner.compiled_ompl import run_compiled_ompl
 from benchmarks.planner.family import corridor_problem
 from benchmarks.planner.ours import plan_repeatedly
-from benchmarks.questions.ompl_peer import has_ompl
-from benchmarks.questions.path_check import fault_of
-from benchmarks.questions.peer import PeerRun
-from benchmarks.questions.trees_peer import run_trees
+from benchmarks.questions.peers import PeerRun, fault_of, has_ompl, run_compiled_ompl, run_trees
 from benchmarks.rows import Row
 from benchmarks.tasks import Rows, Task
 from coop_drake.answers import PlanningProblem

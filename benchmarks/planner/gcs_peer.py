@@ -36,7 +36,7 @@ from pydrake.planning import (
 )
 from shapely.geometry.base import BaseGeometry
 
-from benchmarks.questions.trees_peer import run_trees
+from benchmarks.questions.peers import run_trees
 from coop_drake.answers import PlanningProblem
 from coop_drake.tree import PlanarPose
 from coop_drake.tree.component_tree import ConvexShape, TreeJoint

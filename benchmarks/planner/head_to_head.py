@@ -8,13 +8,9 @@ from statistics import median
 
 from benchmarks.isolated import in_own_process
 from benchmarks.planner.cases import CASES, Case
-from benchmarks.planner.compiled_ompl import run_compiled_ompl
 from benchmarks.planner.gcs_peer import run_gcs
 from benchmarks.planner.ours import plan_repeatedly
-from benchmarks.questions.ompl_peer import has_ompl
-from benchmarks.questions.path_check import fault_of
-from benchmarks.questions.peer import PeerRun
-from benchmarks.questions.trees_peer import CHECKS, run_trees
+from benchmarks.questions.peers import CHECKS, PeerRun, fault_of, has_ompl, run_compiled_ompl, run_trees
 from benchmarks.rows import Row
 from benchmarks.tasks import Rows, Task
 from coop_drake.answers import PlanningProblem

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from time import process_time
 
 from benchmarks.planner.family import corridor_problem, first_question
-from benchmarks.questions.trees_peer import run_trees
+from benchmarks.questions.peers import run_trees
 from coop_drake.answers import Found, PlanningProblem, PlanningResult
 from coop_drake.answers.budget import Budget
 from coop_drake.cli.summary import answer_of

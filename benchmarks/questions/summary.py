@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.questions.record import QuestionRecord
+from benchmarks.questions.answering import QuestionRecord
 from coop_drake.campaign.report.columns import significant
 from coop_drake.campaign.report.distributions import NOTHING, Distribution, distribution
 

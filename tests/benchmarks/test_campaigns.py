@@ -33,10 +33,11 @@ def test_what_is_there_is_shown_as_a_table(tmp_path, capsys):
     assert ended.value.exit_code == 0
     lines = capsys.readouterr().out.splitlines()
     assert "## breaking: 2 of 40 batches" in lines
-    assert lines[-4:-1] == [
-        "| largest multiple of what is certified without a loss | base | warehouse |",
-        "| --- | --- | --- |",
-        "| delay | 2 | 64 or more |",
+    assert lines[-5:-1] == [
+        "| departure | certified | no loss up to | loss at | multiple without one | the loss |",
+        "| --- | --- | --- | --- | --- | --- |",
+        "| base, delay | 0.01 | 0.02 | 0.0225 | 2 | none |",
+        "| warehouse, delay | 0.01 | 0.64 | not found | 64 or more | none |",
     ]
 
 

@@ -4,14 +4,14 @@ import json
 
 import pytest
 
-from benchmarks import commands, starting
+from benchmarks import commands
 from benchmarks.isolated import WorkerError
 
 
 def test_starts_are_ratios_to_the_import_of_drake(monkeypatch):
-    monkeypatch.setattr(starting, "called", lambda arguments: json.dumps({"peak_memory_mb": 350.0}))
-    monkeypatch.setattr(starting, "run_program", lambda command: "")
-    (task,) = starting.starting_tasks()
+    monkeypatch.setattr(commands, "called", lambda arguments: json.dumps({"peak_memory_mb": 350.0}))
+    monkeypatch.setattr(commands, "run_program", lambda command: "")
+    (task,) = commands.starting_tasks()
     rows = {row.name.removeprefix("starting/commands/"): row for row in task.measure(())}
     assert {name.partition("/")[0] for name in rows} == {
         "import_coop_drake",

@@ -8,7 +8,7 @@ from benchmarks.planner import contradiction
 from benchmarks.planner.contradiction import Patience, contradiction_rows
 from benchmarks.planner.family import first_question
 from benchmarks.planner.ours import Planned, plan_repeatedly
-from benchmarks.questions.peer import PeerRun
+from benchmarks.questions.peers import PeerRun
 
 EASY = first_question()
 HONEST = np.array([EASY.start, [*EASY.goal_pose, 0.3, -0.2]])

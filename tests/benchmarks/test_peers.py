@@ -7,11 +7,7 @@ from benchmarks.planner.family import corridor_problem, first_question
 from benchmarks.planner.gcs_peer import run_gcs
 from benchmarks.planner.guarantees import guarantee_table
 from benchmarks.planner.head_to_head import judged
-from benchmarks.questions.footprint import free_goals, prepared_check
-from benchmarks.questions.ompl_peer import run_ompl
-from benchmarks.questions.path_check import fault_of
-from benchmarks.questions.peer import PeerRun
-from benchmarks.questions.trees_peer import run_trees
+from benchmarks.questions.peers import PeerRun, fault_of, free_goals, prepared_check, run_ompl, run_trees
 from benchmarks.rows import Row
 
 EASY = first_question()

@@ -7,10 +7,8 @@ import pytest
 from typer.testing import CliRunner
 
 from benchmarks.app import app
-from benchmarks.questions.answering import ask
-from benchmarks.questions.record import MEASURED, QuestionRecord
+from benchmarks.questions.answering import CASES, MEASURED, QuestionRecord, ask, question_batches
 from benchmarks.questions.settings import QuestionSettings
-from benchmarks.questions.work import CASES, question_batches
 from benchmarks.study import Study, batches_of, load_study
 from coop_drake.campaign.plans import source_digest
 from coop_drake.campaign.results import CampaignFolder

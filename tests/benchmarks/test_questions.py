@@ -10,14 +10,10 @@ import shapely
 from shapely import box
 
 from benchmarks.questions import answering
-from benchmarks.questions.answering import answer, ask
+from benchmarks.questions.answering import QuestionRecord, answer, ask, sampled_margin
 from benchmarks.questions.floors import FLOORS, random_floor
-from benchmarks.questions.narrowest import narrowest_corridor
-from benchmarks.questions.path_check import fault_of
-from benchmarks.questions.peers import Searched, search_by_peers
-from benchmarks.questions.question import random_question
-from benchmarks.questions.record import QuestionRecord
-from benchmarks.questions.sampled_cells import sampled_margin
+from benchmarks.questions.peers import Searched, fault_of, search_by_peers
+from benchmarks.questions.question import narrowest_corridor, random_question
 from benchmarks.questions.settings import QuestionSettings
 from benchmarks.questions.teams import SHAPES, random_count, random_team
 from coop_drake.answers import Found, Infeasible, Undecided

@@ -6,8 +6,7 @@ import json
 import pytest
 from rich.console import Console
 
-from benchmarks.ledger import Ledger, LedgerError
-from benchmarks.rows import Row
+from benchmarks.rows import Ledger, LedgerError, Row
 from benchmarks.table import show
 
 BASE = Row("planner/base/cpu_seconds", 0.5, "s", "OMPL", 0.25)

@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 
 import coop_drake
-from benchmarks.searches.bounds import BoundedDepartures
-from benchmarks.searches.breaking import first_lost
-from benchmarks.searches.worst import margin_of, search_worst
+from benchmarks.searches.departures import BoundedDepartures
+from benchmarks.searches.searching import first_lost, margin_of, search_worst
 from coop_drake.campaign.records import RunRecord
 from coop_drake.plant import planning_problem
 from coop_drake.plant.budgets import budget_of

@@ -10,8 +10,8 @@ import yaml
 from typer.testing import CliRunner
 
 from benchmarks.app import app
+from benchmarks.searches.departures import departures_at, largest_multiple, multiplied
 from benchmarks.searches.findings import BreakingPoint, Finding
-from benchmarks.searches.multiples import departures_at, largest_multiple, multiplied
 from benchmarks.searches.searching import Searching, search_batches
 from benchmarks.study import load_study, make_study
 from coop_drake.campaign import load_campaign

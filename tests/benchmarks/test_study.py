@@ -6,11 +6,15 @@ from math import inf, isnan, nan
 import numpy as np
 import pytest
 
-from benchmarks.questions.record import QuestionRecord
+from benchmarks.questions.answering import QuestionRecord
 from benchmarks.questions.summary import summarise_questions
-from benchmarks.searches.bisections import ends_shown, multiple_shown
-from benchmarks.searches.findings import BreakingPoint, Finding
-from benchmarks.searches.summary import summarise_searches
+from benchmarks.searches.findings import (
+    BreakingPoint,
+    Finding,
+    ends_shown,
+    multiple_shown,
+    summarise_searches,
+)
 from benchmarks.study import Results
 from coop_drake.campaign.records import table_of
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from benchmarks.adversaries.crossings import discs_in_a_corridor
+from benchmarks.adversaries.questions import discs_in_a_corridor
 from benchmarks.planner.family import corridor_problem
 from coop_drake.planning import find_channel
 from coop_drake.planning.cells.cells import Squeezes

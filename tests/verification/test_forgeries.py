@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from benchmarks.adversaries.collisions import Document
-from benchmarks.adversaries.crossings import crossing_question
 from benchmarks.adversaries.forgeries import forged_proof
+from benchmarks.adversaries.questions import crossing_question
 from benchmarks.adversaries.trial import answered, kind_of
 from benchmarks.adversaries.trial import refusal as refused
 from coop_drake.answers.digest import problem_digest
