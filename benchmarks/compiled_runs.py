@@ -22,9 +22,11 @@ from coop_drake import Found, build_maps, load_scenario, plan
 from coop_drake.campaign.measuring import record_of_log
 from coop_drake.campaign.records import RunRecord, table_of
 from coop_drake.campaign.variation import Run
-from coop_drake.compiled_loop import CompiledTransport, prepare, run, simulate_sampled
+from coop_drake.compiled_loop import CompiledTransport, prepare, run
 from coop_drake.errors import PlanError
+from coop_drake.fields import HarmonicMap
 from coop_drake.kernel_times import KERNEL_TIMES
+from coop_drake.simulation import simulate
 
 DEPLOYMENTS: dict[str, dict[str, Any]] = {
     "sampled": {"control_rate": 200.0},
@@ -64,32 +66,31 @@ def compiled_tasks() -> list[Task]:
     return [*pairs, Task("compiled/records", _sizes, alone=True)]
 
 
-def _transport(team: str, label: str) -> CompiledTransport:
-    """Return a shipped transport along its plan; what it compiles is compiled."""
+def _transport(team: str, label: str) -> tuple[CompiledTransport, Sequence[HarmonicMap]]:
+    """Return a shipped transport along its plan, and its maps; what it compiles is compiled."""
     scenario = replace(load_scenario(team), deployment=deployment_of(DEPLOYMENTS[label]))
     result = plan(scenario)
     if not isinstance(result, Found):
         raise PlanError(f"{scenario.path}: no plan to measure runs of: {result.reason}")
-    transport = prepare(scenario, result.plan, build_maps(result.plan))
+    maps = build_maps(result.plan)
+    transport = prepare(scenario, result.plan, maps)
     run(transport)
-    return transport
+    return transport, maps
 
 
 def _rows(team: str, label: str, _: Sequence[Row]) -> list[Row]:
-    """Return runs a second of processor time beside Drake's loop, and the largest differences of pairs.
-
-    Drake's loop has one block in place of all controllers, which is its quickest way.
-    """
-    name, transport = f"compiled/{team}/{label}", _transport(team, label)
+    """Return runs a second of processor time beside Drake's loop, and the largest differences of pairs."""
+    name, (transport, maps) = f"compiled/{team}/{label}", _transport(team, label)
     begun = process_time()
     outcomes = [run(transport, seed=seed) for seed in range(RUNS)]
     seconds = (process_time() - begun) / RUNS
     differences, drakes = dict.fromkeys(_COLUMNS, 0.0), 0.0
     for seed, outcome in enumerate(outcomes[:PAIRS]):
         begun, compiling = process_time(), KERNEL_TIMES.cpu_seconds
-        log = simulate_sampled(transport, replace(transport.scenario.deployment, seed=seed))
+        deployment = replace(transport.scenario.deployment, seed=seed)
+        log = simulate(replace(transport.scenario, deployment=deployment), transport.plan, maps)
         drakes += (process_time() - begun - KERNEL_TIMES.cpu_seconds + compiling) / PAIRS
-        record = record_of_log(Run(0, 0, seed, {}), team, log, transport.plan, "", "fused")
+        record = record_of_log(Run(0, 0, seed, {}), team, log, transport.plan, "")
         for column in _COLUMNS:
             difference = abs(getattr(outcome, column) - getattr(record, column))
             if isfinite(difference):
@@ -105,7 +106,10 @@ def _sizes(_: Sequence[Row]) -> list[Row]:
     """Return the bytes of a run in the file of a batch."""
     from pyarrow import parquet
 
-    transport, varied = _transport("base", "budget"), np.random.default_rng(0).uniform(-0.2, 0.2, BATCH)
+    (transport, _maps), varied = (
+        _transport("base", "budget"),
+        np.random.default_rng(0).uniform(-0.2, 0.2, BATCH),
+    )
     records = []
     for index, error in enumerate(varied.tolist()):
         deployment = replace(transport.scenario.deployment, mass_error=error, seed=index)

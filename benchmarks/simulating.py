@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import gc
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -20,9 +20,7 @@ from benchmarks.rows import Row
 from benchmarks.tasks import Task
 from benchmarks.transport import base_transport
 from coop_drake.answers import Plan
-from coop_drake.answers.log import SimulationLog
-from coop_drake.compiled_loop import build_fused_loop, simulate_fused
-from coop_drake.diagram import Blocks, build_closed_loop
+from coop_drake.diagram import build_closed_loop
 from coop_drake.harmonic_maps import HarmonicMap
 from coop_drake.plant import build_team_plant, set_configuration
 from coop_drake.scenario import Deployment, Scenario
@@ -38,8 +36,6 @@ _REPEATS = 5
 _RUNS = 100
 _SHORT = 0.05
 _LIMIT = 300.0
-
-_SIMULATING: dict[Blocks, Callable[..., SimulationLog]] = {"named": simulate, "fused": simulate_fused}
 
 Transport = tuple[Scenario, Plan, Sequence[HarmonicMap]]
 
@@ -69,16 +65,15 @@ def simulating_tasks() -> list[Task]:
     ]
 
 
-def loop_cost(transport: Transport, blocks: Blocks, horizon: float) -> LoopCost:
+def loop_cost(transport: Transport, horizon: float) -> LoopCost:
     """Run a loop without its watch, then the plant alone with as many evaluations over the same time.
 
     Args:
         transport: Scenario, plan and maps.
-        blocks: How the controllers are built.
         horizon: Simulated time [s].
     """
     scenario, plan, _ = transport
-    loop = (build_fused_loop if blocks == "fused" else build_closed_loop)(*transport)
+    loop = build_closed_loop(*transport)
     try:
         simulator = Simulator(loop.diagram, loop.create_context())
         configure_simulator(simulator, scenario)
@@ -103,10 +98,9 @@ def _ring_task(robots: int) -> Task:
 
 def _rows(team: str, transport: Transport) -> list[Row]:
     rows: list[Row] = []
-    for blocks in ("named", "fused"):
-        for rate in (None, _RATE):
-            mode = blocks if rate is None else f"{blocks}_at_{rate:g}_Hz"
-            rows.extend(_mode_rows(f"simulating/{team}/{mode}", _at(transport, rate), blocks))
+    for rate in (None, _RATE):
+        mode = "continuous" if rate is None else f"{rate:g}_Hz"
+        rows.extend(_mode_rows(f"simulating/{team}/{mode}", _at(transport, rate)))
     return rows
 
 
@@ -115,14 +109,14 @@ def _at(transport: Transport, rate: float | None) -> Transport:
     return replace(scenario, deployment=Deployment(control_rate=rate)), plan, maps
 
 
-def _mode_rows(name: str, transport: Transport, blocks: Blocks) -> list[Row]:
+def _mode_rows(name: str, transport: Transport) -> list[Row]:
     """One evaluation beside the bare plant's; real time over CPU time of the loop alone and of whole runs."""
-    costs = [loop_cost(transport, blocks, _HORIZON) for _ in range(_REPEATS)]
+    costs = [loop_cost(transport, _HORIZON) for _ in range(_REPEATS)]
     # A machine's slow moments must not fall on one side alone.
     cost = min(costs, key=lambda cost: cost.seconds)
     bare = min(costs, key=lambda cost: cost.bare_seconds)
     start = process_time()
-    log = _SIMULATING[blocks](*transport)
+    log = simulate(*transport)
     seconds, simulated = process_time() - start, float(log.times[-1])
     each, bare_each = cost.seconds / cost.evaluations, bare.bare_seconds / bare.bare_evaluations
     return [
@@ -163,24 +157,21 @@ def _bare_plant(scenario: Scenario, plan: Plan, simulated: float, step: float) -
 
 
 def _memory_rows() -> list[Row]:
-    return [
-        Row(f"simulating/memory/{blocks}/growth_a_run", growth, "kB", "first run", first)
-        for blocks in ("named", "fused")
-        for first, growth in [in_own_process(memory_growth, blocks, limit=_LIMIT).value or (0.0, 0.0)]
-    ]
+    first, growth = in_own_process(memory_growth, limit=_LIMIT).value or (0.0, 0.0)
+    return [Row("simulating/memory/growth_a_run", growth, "kB", "first run", first)]
 
 
-def memory_growth(blocks: Blocks) -> tuple[float, float]:
+def memory_growth() -> tuple[float, float]:
     """Resident memory after the first short runs, and by how much each of a hundred more adds to it [kB]."""
     scenario, plan, maps = base_transport()
     brief = replace(scenario, simulator=replace(scenario.simulator, max_time=_SHORT))
     with _collected():
         for _ in range(5):
-            _SIMULATING[blocks](brief, plan, maps)
+            simulate(brief, plan, maps)
     first = _resident_kb()
     with _collected():
         for _ in range(_RUNS):
-            _SIMULATING[blocks](brief, plan, maps)
+            simulate(brief, plan, maps)
     return first, (_resident_kb() - first) / _RUNS
 
 

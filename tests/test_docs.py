@@ -124,8 +124,6 @@ def test_only_named_blocks_that_exist_can_be_replaced():
     plan = small_plan(joint_names(scenario))
     with pytest.raises(ValueError, match="'axis_pcc' is not allowed; expected one of object_estimator"):
         build_closed_loop(scenario, plan, small_maps(), replacements={"axis_pcc": AxisPpc})
-    with pytest.raises(ValueError, match="fused blocks cannot be replaced"):
-        build_closed_loop(scenario, plan, (), blocks="fused", replacements={"axis_ppc": AxisPpc})
 
 
 def test_tables_of_ports_become_tables_of_markdown():

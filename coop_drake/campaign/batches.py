@@ -103,8 +103,6 @@ class Batching:
     def batch(self, scenario: int, tier: Tier, first: int, stop: int) -> Batch:
         """Return one batch; the arguments are those of `Batch`."""
         content = {**self._content(scenario), "tier": tier, "first": first, "stop": stop}
-        if tier == "drake":
-            content["blocks"] = self._variation.runs.blocks
         return Batch(scenario, tier, first, stop, content_digest(content))
 
     def _content_of(self, scenario: int) -> dict[str, Any]:

@@ -16,9 +16,7 @@ from coop_drake.tuning.objective import CRITERIA
 from coop_drake.verification.runs import Rows, budget_share
 
 
-def record_of_log(
-    run: Run, scenario: str, log: SimulationLog, plan: Plan, digest: str, blocks: str
-) -> RunRecord:
+def record_of_log(run: Run, scenario: str, log: SimulationLog, plan: Plan, digest: str) -> RunRecord:
     """Return the record of a run by Drake's loop.
 
     Args:
@@ -27,7 +25,6 @@ def record_of_log(
         log: Its log.
         plan: The plan that it followed.
         digest: Digest of what was run.
-        blocks: Blocks of the loop.
     """
     arrived = log.reached and not log.violation
     axes = np.column_stack([log.object_pose[:, 2], log.joints])
@@ -57,5 +54,4 @@ def record_of_log(
         peak_torque=CRITERIA["peak_torque"].measure(log) if log.joint_names else nan,
         held=int((np.diff(log.held, prepend=0.0) > 0.0).sum()),
         digest=digest,
-        blocks=blocks,
     )

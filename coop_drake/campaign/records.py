@@ -39,8 +39,6 @@ class RunRecord:
         peak_torque: Largest effort of a joint [N m or N]; NaN for a team without joints.
         held: How often the team was held at rest.
         digest: SHA-256 of what was run: scenario with its values, plan, and versions.
-        blocks: Blocks of Drake's loop, ``named`` or ``fused``; empty for the compiled loop and where no run
-            could be made.
     """
 
     run: int
@@ -63,7 +61,6 @@ class RunRecord:
     peak_torque: float = nan
     held: int = 0
     digest: str = ""
-    blocks: str = ""
 
 
 Record = Any

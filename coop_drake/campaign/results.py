@@ -84,7 +84,7 @@ class CampaignFolder:
 
         file = self.path / batch.file
         try:
-            return pyarrow.parquet.read_table(file)
+            return pyarrow.parquet.read_table(file, columns=schema_of(batch.record).names)
         except (OSError, pyarrow.ArrowInvalid) as error:
             again = "remove it, and the same command makes its runs again"
             raise CoopDrakeError(f"{file} is damaged ({' '.join(str(error).split())}); {again}") from error

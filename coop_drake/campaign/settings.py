@@ -39,9 +39,6 @@ class Runs:
         time_limit: Longest that a process may take for each of its runs; for the first one ten minutes more,
             in which it starts and may compile kernels [s].
         keep: Of which of Drake's runs the log is kept, too; any run can be made again later.
-        blocks: Blocks of Drake's loop: ``named`` for those of every robot; ``fused`` for one block in their
-            place where it knows all that a run asks for, equal to 1e-12 and several times quicker. The
-            column ``blocks`` says which made a run.
     """
 
     scenarios: tuple[str, ...]
@@ -56,7 +53,6 @@ class Runs:
     batch: Count | None = None
     time_limit: Positive = 120.0
     keep: Literal["none", "lost", "all"] = "none"
-    blocks: Literal["named", "fused"] = "named"
 
     def batch_of(self, tier: Tier) -> int:
         """Runs of a batch of a tier: with a process of its own it takes a minute or so."""

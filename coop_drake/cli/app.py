@@ -65,6 +65,8 @@ _OLD_NAMES: dict[tuple[str, str], str] = {
     ("compare", ""): "`coop-drake run` with `plant: {grasps: constraints}` in the scenario",
     ("plan", "--workers"): "nothing: a plan is made in one process",
     ("run", "--workers"): "nothing: a plan is made in one process",
+    ("run", "--blocks"): "nothing: every robot has blocks of its own",
+    ("simulate", "--blocks"): "nothing: every robot has blocks of its own",
     ("campaign", "question"): "`python -m benchmarks question`, in a clone of the repository",
 }
 """Commands of before, each alone or with an option or a command below it, and what takes their place."""

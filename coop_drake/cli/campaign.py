@@ -24,7 +24,6 @@ if TYPE_CHECKING:
     from coop_drake.campaign.batches import Batch
     from coop_drake.campaign.results import CampaignFolder
     from coop_drake.campaign.settings import Tier
-    from coop_drake.diagram import Blocks
 
 EXAMPLES = (
     ("campaign many.campaign.yaml", "make all runs, or those that are missing, into out/campaigns/many/"),
@@ -36,7 +35,7 @@ EXAMPLES = (
 
 _LOOPS = {"drake": "Drake's loop", "compiled": "the compiled loop"}
 
-_NAMES = "run", "scenario", "tier", "seed", "values", "digest", "blocks"
+_NAMES = "run", "scenario", "tier", "seed", "values", "digest"
 """Columns of a record that say which run it is, not what it left."""
 
 campaign_app = typer.Typer(
@@ -232,13 +231,12 @@ def _replay(
     task = Task(scenario, planning_problem(scenario))
     results = ResultFolder.of(task.name, folder.path / "replays" / str(index), "simulation")
     counted = _counted(index, "drake", folder, batches)
-    blocks: Blocks = "fused" if counted and counted["blocks"] == "fused" else "named"
-    simulation = simulation_of(task, blocks, reporter)
+    simulation = simulation_of(task, reporter)
     with DrawingProcesses(figures=figures) as drawing:
         code = carry_out(task, plan, results, reporter, drawing, None, simulation, fresh_maps=False)
     log = SimulationLog.load(results.path / "log.npz")
     digest = run_digest(scenario, plan_digest(plan), "drake")
-    drake = record_of_log(run, scenario.name, log, plan, digest, blocks)
+    drake = record_of_log(run, scenario.name, log, plan, digest)
     reporter.facts.update(run=index, counted=False)
     _compare(drake, counted, reporter)
     if any(one.tier == "compiled" and one.first <= index < one.stop for one in batches):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 import typer
 from typer.core import TyperGroup
@@ -174,12 +174,5 @@ Rejoin = Annotated[
         metavar="SECONDS",
         min=0.0,
         help="How long a team of processes rests and waits for one without answers before the run ends.",
-    ),
-]
-BlocksName = Annotated[
-    Literal["named", "fused"],
-    typer.Option(
-        "--blocks",
-        help="named: one set of blocks per robot; fused: one for the team, faster, same results to 1e-12.",
     ),
 ]

@@ -15,7 +15,6 @@ from rich.markup import escape
 
 from coop_drake.cli.options import (
     Apart,
-    BlocksName,
     Effort,
     FaultsFile,
     FreeRunning,
@@ -49,7 +48,6 @@ from coop_drake.viz.drawing_processes import DrawingProcesses
 if TYPE_CHECKING:
     from coop_drake.answers import Plan
     from coop_drake.answers.log import SimulationLog
-    from coop_drake.diagram import Blocks
     from coop_drake.harmonic_maps import HarmonicMap
     from coop_drake.messages.faults import Faults
     from coop_drake.viz import LivePage
@@ -80,7 +78,6 @@ def run_command(
     live: Live = False,
     wait: Wait = False,
     no_figures: NoFigures = False,
-    blocks: BlocksName = "named",
     apart: Apart = False,
     restarts: Restarts = RESTARTS,
     rejoin: Rejoin = REJOIN,
@@ -95,7 +92,6 @@ def run_command(
         task = read_task(scenario, gains, reporter)
         simulation = simulation_of(
             task,
-            blocks,
             reporter,
             apart=apart,
             restarts=restarts,
@@ -115,7 +111,6 @@ def run_command(
 
 def simulation_of(
     task: Task,
-    blocks: Blocks,
     reporter: Reporter,
     *,
     apart: bool = False,
@@ -134,9 +129,7 @@ def simulation_of(
     if faults and not apart:
         raise typer.BadParameter("--faults needs --apart: they are those of messages between processes.")
     if not apart:
-        return partial(_in_one_process, blocks)
-    if blocks == "fused":
-        raise typer.BadParameter("--apart and --blocks fused do not go together: one block drives the team.")
+        return _in_one_process
     from coop_drake.diagram import control_period
     from coop_drake.nodes import simulate_in_processes, wall_clock
 
@@ -154,11 +147,7 @@ def simulation_of(
     )
 
 
-def _in_one_process(blocks: Blocks, *problem: Any, **options: Any) -> SimulationLog:
-    if blocks == "fused":
-        from coop_drake.compiled_loop import simulate_fused
-
-        return simulate_fused(*problem, **options)
+def _in_one_process(*problem: Any, **options: Any) -> SimulationLog:
     from coop_drake.simulation import simulate
 
     return simulate(*problem, **options)

@@ -10,7 +10,6 @@ from rich.markup import escape
 
 from coop_drake.cli.options import (
     Apart,
-    BlocksName,
     FaultsFile,
     FreeRunning,
     FreshMaps,
@@ -60,7 +59,6 @@ def simulate_command(
     live: Live = False,
     wait: Wait = False,
     no_figures: NoFigures = False,
-    blocks: BlocksName = "named",
     apart: Apart = False,
     restarts: Restarts = RESTARTS,
     rejoin: Rejoin = REJOIN,
@@ -75,7 +73,6 @@ def simulate_command(
         task = read_task(scenario, gains, reporter)
         simulation = simulation_of(
             task,
-            blocks,
             reporter,
             apart=apart,
             restarts=restarts,

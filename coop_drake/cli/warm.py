@@ -17,6 +17,9 @@ from coop_drake.progress import Progress
 _SIDE_BY_SIDE = ("coop_drake.planning.warm_up", "coop_drake.harmonic_maps.warm_up")
 """Modules that compile kernels when they are run; they share none."""
 
+_RATE = 200.0
+"""Control rate of the team that the compiled loop runs [Hz]; any will do."""
+
 _SIMULATED_SECONDS = 0.05
 """Simulated time after which every kernel of the closed loop has been called [s]."""
 
@@ -30,7 +33,7 @@ def compile_kernels(reporter: Reporter) -> None:
 
 def _compile(task: Task, progress: Progress) -> None:
     from coop_drake.answers import Found
-    from coop_drake.compiled_loop import simulate_fused
+    from coop_drake.compiled_loop import prepare, run
     from coop_drake.planning.planner import plan
     from coop_drake.simulation import build_maps, simulate
 
@@ -44,7 +47,8 @@ def _compile(task: Task, progress: Progress) -> None:
         short = replace(task.scenario.simulator, max_time=_SIMULATED_SECONDS)
         brief, maps = replace(task.scenario, simulator=short), build_maps(result.plan)
         simulate(brief, result.plan, maps)
-        simulate_fused(brief, result.plan, maps)
+        sampled = replace(brief, deployment=replace(brief.deployment, control_rate=_RATE))
+        run(prepare(sampled, result.plan, maps))
 
 
 @contextmanager

@@ -10,18 +10,25 @@ from pydrake.systems.framework import DiagramBuilder
 
 from coop_drake.answers.plan import Plan
 from coop_drake.compiled_loop.arrays import LoopCells, LoopNominal, LoopPlant
-from coop_drake.diagram.fused import fused_team
 from coop_drake.diagram.knowledge import arrival_goal, governed_cells, rest_tolerance, robot_knowledge
 from coop_drake.diagram.robot_controller import RobotKnowledge
 from coop_drake.errors import ScenarioError
 from coop_drake.geometry.boundary import BoundaryDistance
 from coop_drake.harmonic_maps import HarmonicMap, VelocityField
 from coop_drake.laws.hand_over import governed_gains
-from coop_drake.plant import TeamPlant, base_chain, build_team_plant, read_component_tree, read_team_tree
+from coop_drake.plant import (
+    TeamPlant,
+    base_chain,
+    build_team_plant,
+    read_component_tree,
+    read_team_tree,
+    robot_chain,
+)
 from coop_drake.scenario import Scenario
 from coop_drake.simulation.clearance import TeamClearance
 from coop_drake.simulation.stall import patience
 from coop_drake.systems import axis_laws
+from coop_drake.systems.nominal_kernels import NOTHING
 from coop_drake.systems.team_kernels import FusedTeam
 from coop_drake.tree.component_tree import ComponentTree
 from coop_drake.tree.pose import FloatArray, IntArray
@@ -75,15 +82,15 @@ def prepare(scenario: Scenario, plan: Plan, maps: Sequence[HarmonicMap]) -> Comp
     knowledge = robot_knowledge(exact, plan, maps, team)
     if any(known.robot.has_springs for known in knowledge):
         raise _refusal(scenario, "directives", "a robot with springs", "models without springs")
-    tree, fused = read_component_tree(team), fused_team(team, knowledge)
+    tree, models = read_component_tree(team), _robots(team, knowledge)
     axes = _axes([robot.q_slice for robot in team.robots])
     return CompiledTransport(
         scenario,
         plan,
         tuple(robot.name for robot in team.robots),
         _cells(scenario, plan, maps, [robot.q_slice for robot in team.robots]),
-        fused,
-        _plant(scenario, team, tree, fused),
+        models,
+        _plant(scenario, team, tree, models),
         _nominal(plan, team, knowledge),
         team.plant_state(plan.start, np.zeros(len(plan.start))),
         team.position_index,
@@ -121,8 +128,8 @@ def _refusal(scenario: Scenario, key: str, found: object, allowed: str) -> Scena
         str(scenario.path),
         key,
         found,
-        f"{allowed}: the compiled loop, and fused blocks of a sampled team, support only teams with rigid "
-        "grasps, models without springs, and controllers without predictor, observer and holds",
+        f"{allowed}: the compiled loop supports only teams with rigid grasps, models without springs, and "
+        "controllers without predictor, observer and holds",
     )
 
 
@@ -158,12 +165,37 @@ def _cells(scenario: Scenario, plan: Plan, maps: Sequence[HarmonicMap], joints: 
     )
 
 
-def _plant(scenario: Scenario, team: TeamPlant, tree: ComponentTree, fused: FusedTeam) -> LoopPlant:
+def _robots(team: TeamPlant, knowledge: Sequence[RobotKnowledge]) -> FusedTeam:
+    """Return the models of all robots as arrays.
+
+    Args:
+        team: The simulated team, one tree rooted at the object.
+        knowledge: What every robot knows before the run.
+    """
+    chains = [robot_chain(known.robot) for known in knowledge]
+    bases, motion = [base_chain(team, robot) for robot in team.robots], knowledge[0].motion
+    counts = [
+        [len(chain) for chain in chains],
+        [len(base.chain) for base in bases],
+        [robot.q_slice.stop - robot.q_slice.start for robot in team.robots],
+    ]
+    return FusedTeam(
+        places=np.array([team.position_index, team.plant.num_positions() + team.velocity_index]),
+        first=np.array([[0, *np.cumsum(row)] for row in counts]),
+        chains=np.vstack(chains),
+        base_chains=np.vstack([base.chain for base in bases]),
+        yaws=np.array([base.yaw for base in bases]),
+        loads=np.array([known.load for known in knowledge]),
+        tracking=NOTHING if motion is None else motion.tracking_row(knowledge[0].cells[0]),
+    )
+
+
+def _plant(scenario: Scenario, team: TeamPlant, tree: ComponentTree, models: FusedTeam) -> LoopPlant:
     whole = read_team_tree(team, tree)
     shapes, walls = TeamClearance(scenario.workspace.polygon, tree).kernel_arguments
     rows = [(0, 0)]
     for k, robot in enumerate(team.robots):
-        begin = k + int(fused.first[2, k])
+        begin = k + int(models.first[2, k])
         rows.extend((begin + 1 + i, k) for i in range(robot.q_slice.stop - robot.q_slice.start))
     return LoopPlant(
         whole.tree,

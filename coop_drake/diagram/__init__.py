@@ -1,6 +1,6 @@
 """Wiring: one robot's controller, the transport station, the closed loop."""
 
-from coop_drake.diagram.closed_loop import Blocks, ClosedLoop, build_closed_loop
+from coop_drake.diagram.closed_loop import ClosedLoop, build_closed_loop
 from coop_drake.diagram.loop import Loop
 from coop_drake.diagram.robot_controller import (
     TELEMETRY,
@@ -13,7 +13,6 @@ from coop_drake.diagram.world import World, brakes_of, build_world, control_peri
 
 __all__ = [
     "TELEMETRY",
-    "Blocks",
     "ClosedLoop",
     "Loop",
     "Replacements",

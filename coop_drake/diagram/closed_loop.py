@@ -4,25 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
 
+import numpy as np
 from pydrake.systems.framework import Context, Diagram, DiagramBuilder
 
 from coop_drake.answers.plan import Plan
 from coop_drake.diagram.deployment import DeployedController, deploy
-from coop_drake.diagram.fused import FusedControllers, add_fused_controllers
 from coop_drake.diagram.hold import add_supervisor
 from coop_drake.diagram.knowledge import hold_of, robot_knowledge
-from coop_drake.diagram.loop import Loop
-from coop_drake.diagram.robot_controller import Replacements, build_robot_controller
-from coop_drake.diagram.station import build_driven_station, build_station
+from coop_drake.diagram.loop import Loop, Places, PortRow
+from coop_drake.diagram.robot_controller import TELEMETRY, Replacements, build_robot_controller
+from coop_drake.diagram.station import build_station
 from coop_drake.harmonic_maps import HarmonicMap
 from coop_drake.plant.configuration import displacement
 from coop_drake.scenario import Scenario
 from coop_drake.systems import CellPlanner, HoldSupervisor
-
-Blocks = Literal["named", "fused"]
-"""How the controllers are built: a block for each law of each robot, or one block for them all."""
+from coop_drake.systems.departure_monitor import ALARM_SIZE
 
 
 @dataclass(frozen=True)
@@ -34,14 +31,12 @@ class ClosedLoop(Loop):
         controllers: One sub-Diagram for each robot, as the others see it.
         deployed: Controllers with sensors, actuators and radio, empty where the team is ideal.
         supervisor: What holds the team, None where nothing can ask for it.
-        fused: The block that drives the team in the fused mode, which has no controllers of single robots.
     """
 
     cell_planner: CellPlanner
     controllers: tuple[Diagram, ...]
     deployed: tuple[DeployedController, ...]
     supervisor: HoldSupervisor | None
-    fused: FusedControllers | None
 
     @property
     def bare_controllers(self) -> tuple[Diagram, ...]:
@@ -51,12 +46,42 @@ class ClosedLoop(Loop):
     def create_context(self) -> Context:
         """Create a context of a team at rest, in the first cell, with every p_G at the plan's start."""
         context = super().create_context()
-        if self.fused is not None:
-            governor = self.fused.integrator
-            governor.set_integral_value(governor.GetMyMutableContextFromRoot(context), self.plan.start[:2])
         for deployed in self.deployed:
             deployed.prepare(context, self.plan.start[:2])
         return context
+
+    def places(self, ports: PortRow) -> Places:
+        """Add all outputs that are logged to a row, and return where they stand."""
+        robots = self.team.robots
+        states = [ports.add(self.station.diagram, f"robot_{robot.index}_state") for robot in robots]
+        efforts = [ports.add(controller, "robot_effort") for controller in self.controllers]
+        logged = [name for name in TELEMETRY if name != "object_state"]
+        of = {name: [ports.add(law, name) for law in self.bare_controllers] for name in ("ready", *logged)}
+        clock = [] if self.supervisor is None else ports.add(self.bare_controllers[0], "clock")
+        causes = [] if self.supervisor is None else ports.add(self.supervisor, "causes")
+        monitored = [law for law in self.bare_controllers if law.HasOutputPort("alarm")]
+        alarms = [ports.add(law, "alarm") for law in monitored]
+        # Every robot has bounds for the angle; they are equal, and the first robot's are taken.
+        bounds = [np.split(funnels, 2) for funnels in of["funnels"]]
+        return Places(
+            instant=np.concatenate(
+                [ports.add(self.cell_planner, name) for name in ("current_cell", "arrived")]
+            ),
+            base_poses=np.array([state[:3] for state in states]),
+            governors=np.array(of["governor_position"]),
+            funnel_lower=np.concatenate([bounds[0][0][:1], *(lower[1:] for lower, _ in bounds)]),
+            funnel_upper=np.concatenate([bounds[0][1][:1], *(upper[1:] for _, upper in bounds)]),
+            energy_margins=np.concatenate(of["energy_margin"]),
+            commanded_wrenches=np.array(of["hand_command"])[:, 3:],
+            base_wrenches=np.array([effort[:3] for effort in efforts]),
+            joint_torques=np.concatenate([effort[3:] for effort in efforts]),
+            accelerations=np.array(of["object_acceleration"]),
+            realised=self.realised(ports),
+            ready_margins=np.array([margin for _, margin in of["ready"]]),
+            clock_lag=np.array(clock[:1], dtype=np.intp),
+            causes=np.array(causes, dtype=np.intp),
+            alarms=np.array(alarms, dtype=np.intp).reshape(-1, ALARM_SIZE),
+        )
 
 
 def build_closed_loop(
@@ -64,7 +89,6 @@ def build_closed_loop(
     plan: Plan,
     maps: Sequence[HarmonicMap],
     *,
-    blocks: Blocks = "named",
     replacements: Replacements | None = None,
 ) -> ClosedLoop:
     """Build the closed loop; only ready reports, and requests for a hold if any, cross between robots.
@@ -73,21 +97,15 @@ def build_closed_loop(
         scenario: The scenario.
         plan: A plan for it.
         maps: The harmonic map of every transition.
-        blocks: ``named`` for the law as blocks of every robot; ``fused`` for speed alone: one block drives
-            the team in continuous time, and nothing shows any more that robots need no state of each other.
-            One block for a sampled team is that of :mod:`coop_drake.compiled_loop`.
-        replacements: Blocks of a user's own in every robot's controller, see `build_robot_controller`; with
-            named blocks only.
+        replacements: Blocks of a user's own in every robot's controller, see `build_robot_controller`.
 
     Raises:
         PlanError: The plan belongs to another team, or the number of maps is not the number of cells.
-        ScenarioError: The models do not make a team, or fused blocks do not know what the scenario wants.
-        ValueError: Replacements for fused blocks, or for a block that does not exist.
+        ScenarioError: The models do not make a team.
+        ValueError: A replacement for a block that does not exist.
     """
-    if replacements and blocks == "fused":
-        raise ValueError("replacements: fused blocks cannot be replaced; expected blocks='named'")
     builder = DiagramBuilder()
-    station = build_station(scenario) if blocks == "named" else build_driven_station(scenario)
+    station = build_station(scenario)
     team = station.team
     knowledge = robot_knowledge(scenario, plan, maps, team)
     start = plan.start + displacement(scenario.deployment, len(plan.start))
@@ -97,11 +115,7 @@ def build_closed_loop(
     )
     hold, supervisor = hold_of(scenario, plan), None
     if hold is not None:
-        heard = len(team.robots) if blocks == "named" else 0
-        supervisor = add_supervisor(builder, hold, planner, heard, scenario.deployment.period)
-    if blocks == "fused":
-        controllers = add_fused_controllers(builder, scenario, station, planner, supervisor, knowledge)
-        return ClosedLoop(builder.Build(), station, plan, start, planner, (), (), supervisor, controllers)
+        supervisor = add_supervisor(builder, hold, planner, len(team.robots), scenario.deployment.period)
     built, deployed = [], []
     for k, known in enumerate(knowledge):
         controller = build_robot_controller(known, replacements)
@@ -118,7 +132,7 @@ def build_closed_loop(
             )
         built.append(controller)
     return ClosedLoop(
-        builder.Build(), station, plan, start, planner, tuple(built), tuple(deployed), supervisor, None
+        builder.Build(), station, plan, start, planner, tuple(built), tuple(deployed), supervisor
     )
 
 

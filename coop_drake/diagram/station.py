@@ -58,35 +58,6 @@ def build_station(scenario: Scenario) -> TransportStation:
     return TransportStation(builder.Build(), team)
 
 
-def build_driven_station(scenario: Scenario) -> TransportStation:
-    """Build the ideal team's plant without sensors, for one block that drives all robots.
-
-    ======= ============================ ========== ========================================================
-    input   ``base_forces``              3 N        wrench on every base in its own axes
-    input   ``joint_torques``            n          torques of all joints in the order of q, if there are any
-    output  ``team_state``               2 (3 + n)  the plant's positions and velocities, its own order
-    output  ``generalized_acceleration`` 3 + n      the plant's accelerations, for the log alone
-    output  ``query_object``             abstract   geometry, for visualization
-    ======= ============================ ========== ========================================================
-
-    Where efforts are held between samples, inputs and measurements are those of :func:`build_station`.
-
-    Raises:
-        ScenarioError: The models do not make a team.
-    """
-    builder = DiagramBuilder()
-    team = build_team_plant(scenario, builder)
-    tilt_floor(team, scenario.deployment.floor)
-    if scenario.deployment.period is None:
-        _drive_bases(builder, team)
-    else:
-        _drive_robots(builder, team, _measure(builder, team))
-    builder.ExportOutput(team.plant.get_state_output_port(), "team_state")
-    builder.ExportOutput(team.plant.get_generalized_acceleration_output_port(), "generalized_acceleration")
-    builder.ExportOutput(team.scene_graph.get_query_output_port(), "query_object")
-    return TransportStation(builder.Build(), team)
-
-
 def _measure(builder: DiagramBuilder, team: TeamPlant) -> list[OutputPort]:
     """Add the sensors of the object's pose and of every robot's own state; return the latter."""
     names = ["object_pose", *(f"robot_{robot.index}_state" for robot in team.robots)]
@@ -136,15 +107,6 @@ def _efforts(team: TeamPlant) -> Selector:
             "joint_torques": [(k, i) for k, size in enumerate(sizes) for i in range(3, size)],
         },
     )
-
-
-def _drive_bases(builder: DiagramBuilder, team: TeamPlant) -> None:
-    """Add inputs for wrenches in the axes of the bases, and for the torques of all joints together."""
-    plant, thrusters = team.plant, _add_thrusters(builder, team, with_object=False)
-    builder.Connect(plant.get_body_poses_output_port(), thrusters.get_body_poses_input_port())
-    builder.ExportInput(thrusters.get_command_input_port(), "base_forces")
-    if team.joints:
-        builder.ExportInput(plant.get_actuation_input_port(), "joint_torques")
 
 
 def _add_thrusters(builder: DiagramBuilder, team: TeamPlant, *, with_object: bool) -> Propeller:

@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
 from pydrake.systems.framework import Context, DiagramBuilder
 
 from coop_drake.answers.plan import Plan
 from coop_drake.diagram.deployment import Body, build_body
 from coop_drake.diagram.knowledge import hold_of
-from coop_drake.diagram.loop import Loop
+from coop_drake.diagram.loop import Loop, Places, PortRow
 from coop_drake.diagram.station import build_station
 from coop_drake.diagram.wrapping import effort_limits
 from coop_drake.errors import ScenarioError
@@ -20,6 +21,7 @@ from coop_drake.plant.configuration import displacement
 from coop_drake.plant.team import base_inertia
 from coop_drake.scenario import Scenario
 from coop_drake.systems import Exchange, TeamLink, robot_record, supervisor_record
+from coop_drake.systems.departure_monitor import ALARM_SIZE
 
 
 @dataclass(frozen=True)
@@ -42,6 +44,36 @@ class World(Loop):
         for body in self.bodies:
             body.prepare(context)
         return context
+
+    def places(self, ports: PortRow) -> Places:
+        """Add what robots and supervisor of a world report for the log, and what the world has itself."""
+        robots = self.team.robots
+        added, records, at = ports.add(self.link, "records"), [], 0
+        for names in self.records:
+            ends = at + np.cumsum([*names.values()])
+            records.append(dict(zip(names, np.split(added[at : ends[-1]], ends[:-1] - at), strict=True)))
+            at = ends[-1]
+        *own, supervisor = records
+        states = [ports.add(self.station.diagram, f"robot_{robot.index}_state") for robot in robots]
+        efforts = [ports.add(body.diagram, "robot_effort") for body in self.bodies]
+        bounds = [np.split(record["funnels"], 2) for record in own]
+        return Places(
+            instant=np.concatenate([supervisor["current_cell"], supervisor["arrived"]]),
+            base_poses=np.array([state[:3] for state in states]),
+            governors=np.array([record["governor_position"] for record in own]),
+            funnel_lower=np.concatenate([bounds[0][0][:1], *(lower[1:] for lower, _ in bounds)]),
+            funnel_upper=np.concatenate([bounds[0][1][:1], *(upper[1:] for _, upper in bounds)]),
+            energy_margins=np.concatenate([record["energy_margin"] for record in own]),
+            commanded_wrenches=np.array([record["hand_command"][3:] for record in own]),
+            base_wrenches=np.array([effort[:3] for effort in efforts]),
+            joint_torques=np.concatenate([effort[3:] for effort in efforts]),
+            accelerations=np.array([record["object_acceleration"] for record in own]),
+            realised=self.realised(ports),
+            ready_margins=np.array([record["ready"][1] for record in own]),
+            clock_lag=own[0]["clock"][:1],
+            causes=supervisor["causes"],
+            alarms=np.array([record["alarm"] for record in own]).reshape(-1, ALARM_SIZE),
+        )
 
 
 def control_period(scenario: Scenario) -> float:

@@ -7,7 +7,7 @@ the plant, :mod:`coop_drake.diagram.disturbances` adds forces to those of the ro
 new departure is a field here, a block there, tests in ``tests/diagram/test_deployment.py``, a mild and a
 harsh case in ``tests/closed_loop/test_deployment.py``, a row of ``docs/how_to/deployment.md``, wrong values
 for it in ``tests/support/mutants/values.py``, and ``docs/reference/scenario.md``, which ``python -m
-docs.generate`` writes. The compiled loop, and with it fused blocks of sampled teams, takes departures from
+docs.generate`` writes. The compiled loop takes departures from
 ``coop_drake/compiled_loop/departing.py``, and refuses those that it does not know.
 """
 

@@ -8,8 +8,8 @@ import numpy as np
 from pydrake.systems.framework import Context
 
 from coop_drake.compiled import prepared
+from coop_drake.diagram.loop import Loop, Places, PortRow
 from coop_drake.laws import total_wrench
-from coop_drake.simulation.logged_ports import LoggedLoop, Places, PortRow, places_of
 from coop_drake.simulation.step_kernels import row_figures
 from coop_drake.systems.block import NUMBER
 from coop_drake.tree.pose import FloatArray
@@ -76,21 +76,21 @@ class Sample:
 
 
 class Telemetry:
-    """Evaluates the ports of a closed loop, of named or of fused blocks.
+    """Evaluates the ports of a closed loop.
 
     Args:
         loop: The closed loop.
         root: Context of the whole diagram; every reading is of its present content.
     """
 
-    def __init__(self, loop: LoggedLoop, root: Context) -> None:
+    def __init__(self, loop: Loop, root: Context) -> None:
         self._team, self._root = loop.team, root
         self._plant_context = self._team.plant.GetMyContextFromRoot(root)
         rates = self._team.plant.num_positions() + self._team.velocity_index
         self._z = len(self._team.position_index)
         self._own = np.concatenate([self._team.position_index, rates])
         self._ports = PortRow(root)
-        places = [np.asarray(part, dtype=np.intp) for part in places_of(loop, self._ports)]
+        places = [np.asarray(part, dtype=np.intp) for part in loop.places(self._ports)]
         self._order = np.concatenate([part.ravel() for part in places])
         ends = np.cumsum([part.size for part in places]).tolist()
         parts = zip(places, ends, strict=True)

@@ -8,12 +8,11 @@ import numpy as np
 from pydrake.systems.framework import Context, EventStatus
 
 from coop_drake.answers.plan import Plan
-from coop_drake.diagram import World
+from coop_drake.diagram import Loop, World
 from coop_drake.laws.arrival import ArrivalGoal
 from coop_drake.laws.departure import departing_name
 from coop_drake.plant import TeamPlant
 from coop_drake.simulation.invariants import Invariants, Margins
-from coop_drake.simulation.logged_ports import LoggedLoop, ReportingLoop
 from coop_drake.simulation.recorder import Recorder
 from coop_drake.simulation.stall import (
     PATIENCE_ALLOWANCE,
@@ -40,7 +39,7 @@ class Watch:
 
     def __init__(
         self,
-        loop: LoggedLoop,
+        loop: Loop,
         invariants: Invariants,
         goal: ArrivalGoal,
         root: Context,
@@ -88,10 +87,10 @@ class Watch:
     def _beyond_holding(self, sample: Sample) -> str | None:
         """Return why a robot's monitor ends the run, None where it does not.
 
-        The drives brake where a departure grows on. A loop of one block for all robots cannot be held. A team
+        The drives brake where a departure grows on. A loop without a supervisor cannot be held. A team
         that is held for long by its own monitors will not go on.
         """
-        if isinstance(self._loop, ReportingLoop):
+        if not sample.causes.size:
             asking = np.flatnonzero(sample.alarms[:, 0]).tolist()
         else:
             asking = [k for k, cause in enumerate(sample.causes[1:]) if cause == ASKED]
@@ -101,7 +100,7 @@ class Watch:
         team, plan = self._loop.team, self._loop.plan
         if braking:
             return f"{_names(team, braking)} lets the drives brake{_departing(team, plan, sample)}"
-        if asking and isinstance(self._loop, ReportingLoop):
+        if asking and not sample.causes.size:
             return f"{_names(team, asking)} asks for a hold{_departing(team, plan, sample)}"
         if asking and sample.time - since > PATIENCE_ALLOWANCE:
             long = f"has asked for a hold since t = {since:.6g} s"

@@ -30,8 +30,6 @@ from coop_drake.systems.sensors import TeamSensor, build_separate_sensor
 from coop_drake.systems.shifted_measurement import ShiftedMeasurement
 from coop_drake.systems.state_predictor import StatePredictor
 from coop_drake.systems.sticking import Sticking
-from coop_drake.systems.team_controller import TeamController
-from coop_drake.systems.team_kernels import FusedCell, FusedTeam
 from coop_drake.systems.team_link import Exchange, TeamLink, robot_record, supervisor_record
 from coop_drake.systems.wheel_slips import WheelSlips
 from coop_drake.systems.wrench_law import WrenchLaw
@@ -52,8 +50,6 @@ __all__ = [
     "Exchange",
     "FloorFriction",
     "FunnelClock",
-    "FusedCell",
-    "FusedTeam",
     "GovernedCell",
     "HoldMonitor",
     "HoldReceiver",
@@ -75,7 +71,6 @@ __all__ = [
     "ShiftedMeasurement",
     "StatePredictor",
     "Sticking",
-    "TeamController",
     "TeamLink",
     "TeamSensor",
     "WheelSlips",

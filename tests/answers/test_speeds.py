@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 
 from coop_drake.answers.speeds import SHORTEST, base_speeds, peak_speeds, steadiness
-from coop_drake.compiled_loop import simulate_fused
 from coop_drake.plant import planning_problem
+from coop_drake.simulation import simulate
 from tests.support.small_loop import small_maps, small_problem
 
 
 @pytest.fixture(scope="module")
 def run():
     scenario, plan = small_problem()
-    return planning_problem(scenario), simulate_fused(scenario, plan, small_maps())
+    return planning_problem(scenario), simulate(scenario, plan, small_maps())
 
 
 def test_a_base_that_turns_at_a_constant_speed_has_that_speed(run):

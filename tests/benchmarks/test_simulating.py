@@ -6,9 +6,8 @@ from benchmarks.simulating import loop_cost, simulating_tasks
 from tests.support.small_loop import small_maps, small_problem
 
 
-@pytest.mark.parametrize("blocks", ["named", "fused"])
-def test_a_loop_is_measured_beside_the_plant_alone(blocks):
-    cost = loop_cost((*small_problem("base"), small_maps()), blocks, 0.1)
+def test_a_loop_is_measured_beside_the_plant_alone():
+    cost = loop_cost((*small_problem("base"), small_maps()), 0.1)
     assert cost.evaluations >= 3 * 5  # three for each step of 0.02 s at most
     assert cost.bare_evaluations == pytest.approx(cost.evaluations, rel=0.25)
     assert cost.seconds > 0.0

@@ -36,7 +36,6 @@ runs:
   scenarios: [room.scenario.yaml]
   count: {RUNS}
   batch: {BATCH}
-  blocks: fused
   vary:
     deployment.mass_error: !Uniform {{min: -0.1, max: 0.1}}
 """
@@ -273,7 +272,7 @@ def test_a_log_that_cannot_be_written_ends_the_command_and_loses_no_run(undistur
     order = undisturbed.order(tmp_path / "kept")
     folder = CampaignFolder(tmp_path / "kept")
     file = undisturbed.file.with_name("kept.campaign.yaml")
-    file.write_text(FILE.replace("blocks: fused", "blocks: fused\n  keep: all"))
+    file.write_text(FILE.replace("  vary:", "  keep: all\n  vary:"))
     folder.campaign.write_bytes(file.read_bytes())
     batch = next(Batching(Variation(load_campaign(file)), undisturbed.plans).batches())
     order = replace(order, campaign=str(file), batch=batch)

@@ -9,7 +9,6 @@ import pytest
 from coop_drake.answers import BeyondLimits, save_plan
 from coop_drake.answers.limits import TeamLimits
 from coop_drake.answers.speeds import peak_speeds
-from coop_drake.compiled_loop import simulate_fused
 from coop_drake.errors import PlanError, RefusalError
 from coop_drake.laws import FixedGains, ScheduledGains
 from coop_drake.planning.duration import estimated
@@ -18,7 +17,7 @@ from coop_drake.planning.planner import plan as make
 from coop_drake.planning.transitions import reschedule
 from coop_drake.plant import planning_problem, run_setup
 from coop_drake.scenario.limits import RobotLimits
-from coop_drake.simulation import build_maps
+from coop_drake.simulation import build_maps, simulate
 from coop_drake.verification import verify_file
 from coop_drake.verification.refusals import check_limits
 from coop_drake.verification.runs import verify_log
@@ -46,7 +45,7 @@ def run():
     scenario = limited()
     problem = planning_problem(scenario)
     plan = planned(problem)
-    return scenario, problem, plan, simulate_fused(scenario, plan, build_maps(plan))
+    return scenario, problem, plan, simulate(scenario, plan, build_maps(plan))
 
 
 def test_a_run_keeps_the_limit_that_it_would_exceed_without_one(run):

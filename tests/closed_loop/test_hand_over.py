@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from coop_drake.compiled_loop import simulate_fused
 from coop_drake.laws import FixedGains
 from coop_drake.simulation import build_maps, simulate
 from tests.support.hand_over import assert_certified
@@ -31,12 +30,11 @@ def test_no_switch_breaks_anything_and_none_is_waited_for_in_vain(seed, tmp_path
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("gain_set", "steps"), [(None, False), (FixedGains(), True)])
-@pytest.mark.parametrize("run", [simulate, simulate_fused], ids=["named", "fused"])
-def test_forces_go_on_where_they_were_unless_gains_step_as_printed(gain_set, steps, run):
+def test_forces_go_on_where_they_were_unless_gains_step_as_printed(gain_set, steps):
     """The change over a step that holds a switch, beside 1.5 times the largest of all others."""
     scenario, plan = small_problem("base", gain_set)
     short = replace(scenario, simulator=replace(scenario.simulator, max_step_size=0.002, max_time=2.5))
-    log = run(short, plan, small_maps())
+    log = simulate(short, plan, small_maps())
     efforts = np.concatenate(
         [log.base_wrenches[..., :2].reshape(len(log.times), -1), log.joint_torques], axis=1
     )

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from pydrake.systems.analysis import Simulator
 
-from coop_drake.compiled_loop import simulate_fused
 from coop_drake.diagram import build_closed_loop
 from coop_drake.errors import ScenarioError
 from coop_drake.planning.planner import plan as plan_problem
@@ -41,11 +40,11 @@ SPEED, RATE = 0.01, 0.02
 
 @pytest.fixture(scope="module")
 def base():
-    """The loop of base, fused, that can be told to hold, and its contexts at random moments of a run."""
+    """The loop of base that can be told to hold, and its contexts at random moments of a run."""
     scenario = replace(load_scenario("base"), control=Control(hold=Hold()))
     problem = planning_problem(scenario)
     plan = plan_problem(problem, scenario.gain_sets["scheduled"], gain_set_name="scheduled").plan
-    loop = build_closed_loop(scenario, plan, build_maps(plan), blocks="fused")
+    loop = build_closed_loop(scenario, plan, build_maps(plan))
     clearance = TeamClearance(scenario.workspace.polygon, read_component_tree(loop.team.as_tree))
     simulator = Simulator(loop.diagram, loop.create_context())
     configure_simulator(simulator, scenario)
@@ -111,11 +110,10 @@ def held_scenario(hold, deployment=None):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("run", [simulate, simulate_fused], ids=["named", "fused"])
-def test_a_scheduled_hold_costs_its_time_and_no_more(run):
+def test_a_scheduled_hold_costs_its_time_and_no_more():
     scenario, plan = held_scenario(Hold(at=(0.2, 0.9), duration=1.5))
-    log = run(scenario, plan, small_maps())
-    free = simulate_fused(replace(scenario, control=Control()), plan, small_maps())
+    log = simulate(scenario, plan, small_maps())
+    free = simulate(replace(scenario, control=Control()), plan, small_maps())
     assert (log.reached, log.violation) == (True, "")
     told = 2.2  # from 0.2 s to 2.4 s: the second begins in the first
     assert told <= log.times[-1] - free.times[-1] <= told + 2.0
@@ -199,12 +197,3 @@ def test_a_hold_after_silence_needs_a_control_rate():
     scenario, _ = held_scenario(Hold(silence=0.1))
     with pytest.raises(ScenarioError, match=r"control\.hold\.silence: 0\.1 is not allowed"):
         validate(scenario)
-
-
-@pytest.mark.parametrize(
-    ("hold", "rate"), [(Hold(energy=2.0), None), (Hold(silence=0.1), 200.0), (Hold(at=(1.0,)), 200.0)]
-)
-def test_one_block_is_held_at_stated_times_in_continuous_time_alone(hold, rate):
-    scenario, plan = held_scenario(hold, Deployment(control_rate=rate))
-    with pytest.raises(ScenarioError, match=r"control\.hold"):
-        simulate_fused(scenario, plan, small_maps())

@@ -6,7 +6,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from coop_drake.compiled_loop import prepare, run, simulate_sampled
+from coop_drake.compiled_loop import prepare, run
 from coop_drake.nodes import simulate_apart
 from coop_drake.scenario import (
     ActuatorLimits,
@@ -19,6 +19,7 @@ from coop_drake.scenario import (
     RobotDepartures,
 )
 from coop_drake.simulation import build_maps, simulate
+from tests.support.sampled_block import simulate_sampled
 from tests.support.tubes import WITH_AXES, tubed_problem
 
 pytestmark = pytest.mark.slow
@@ -77,9 +78,9 @@ def test_what_goes_on_never_ends_in_an_arrival(departing):
     assert not log.reached
     assert log.held.any()
     assert "as far as its level allows" in log.violation
-    fused = simulate_sampled(transport(), departing)
-    assert fused.violation.split(": ")[2] == outcome.reason.split(": ")[2]
-    assert abs(fused.times[-1] - outcome.time) < 0.006
+    one_block = simulate_sampled(transport(), departing)
+    assert one_block.violation.split(": ")[2] == outcome.reason.split(": ")[2]
+    assert abs(one_block.times[-1] - outcome.time) < 0.006
 
 
 def test_robots_in_nodes_of_their_own_let_the_drives_brake():

@@ -1,4 +1,4 @@
-"""A team within its budget stays in the position's tube, with named and with fused blocks."""
+"""A team within its budget stays in the position's tube, in Drake's loop and in the compiled one."""
 
 from dataclasses import replace
 from functools import cache
@@ -6,7 +6,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from coop_drake.compiled_loop import simulate_fused
+from coop_drake.compiled_loop import prepare
 from coop_drake.errors import RefusalError, ScenarioError
 from coop_drake.scenario import ActuatorLimits, Deployment, Hold, Measurements, Messages
 from coop_drake.scenario.control import Control
@@ -14,9 +14,10 @@ from coop_drake.simulation import build_maps, simulate
 from coop_drake.verification.runs.rows import Rows
 from coop_drake.verification.runs.tube import check_budget_used
 from tests.support.run_checks import verified_run
+from tests.support.sampled_block import simulate_sampled
 from tests.support.tubes import BUDGET, tubed_problem
 
-FUSED = replace(BUDGET, delay=0.0, lag=0.0, position_noise=0.0, velocity_noise=0.0)
+COMPARED = replace(BUDGET, delay=0.0, lag=0.0, position_noise=0.0, velocity_noise=0.0)
 
 
 @cache
@@ -54,22 +55,22 @@ def test_a_noisy_late_and_wrong_team_stays_in_the_tube():
 
 @pytest.mark.slow
 @pytest.mark.parametrize("mass_error", [-0.2, 0.2])
-def test_fused_and_named_blocks_lead_alike(mass_error):
-    scenario, plan, maps = problem(FUSED)
+def test_the_compiled_loop_leads_as_blocks_do(mass_error):
+    scenario, plan, maps = problem(COMPARED)
     scenario = replace(scenario, deployment=Deployment(control_rate=200.0, mass_error=mass_error))
-    fused = simulate_fused(scenario, plan, maps)
-    used, fast = check_budget_used(Rows(fused, plan))
-    assert fused.reached
+    found = simulate_sampled(prepare(scenario, plan, maps))
+    used, fast = check_budget_used(Rows(found, plan))
+    assert found.reached
     assert max(used.tightest, fast.tightest) < 0.8
     if mass_error > 0.0:
         named = simulate(scenario, plan, maps)
-        assert len(named.times) == len(fused.times)
+        assert len(named.times) == len(found.times)
         for name in ("object_pose", "governor_position", "energy_margin", "ready_margins"):
-            np.testing.assert_allclose(getattr(named, name), getattr(fused, name), atol=1e-9)
+            np.testing.assert_allclose(getattr(named, name), getattr(found, name), atol=1e-9)
 
 
 def test_a_held_team_keeps_its_tube():
-    scenario, plan, maps = problem(FUSED)
+    scenario, plan, maps = problem(COMPARED)
     scenario = replace(scenario, control=Control(hold=Hold(at=(0.4,), duration=1.0)))
     log = simulate(scenario, plan, maps)
     used, fast = check_budget_used(Rows(log, plan))
@@ -93,6 +94,6 @@ def test_a_log_that_departs_from_the_tube_is_refused():
 
 
 def test_a_plan_with_a_tube_needs_a_control_rate():
-    scenario, plan, maps = problem(FUSED)
+    scenario, plan, maps = problem(COMPARED)
     with pytest.raises(ScenarioError, match="control_rate"):
         simulate(replace(scenario, deployment=Deployment()), plan, maps)

@@ -8,7 +8,6 @@ import pytest
 
 from coop_drake.answers import save_plan
 from coop_drake.answers.limits import TeamLimits
-from coop_drake.compiled_loop import simulate_fused
 from coop_drake.errors import PlanError, RefusalError
 from coop_drake.planning.planner import plan as make
 from coop_drake.plant import planning_problem, run_setup
@@ -44,7 +43,7 @@ def planned(scenario):
 def case(request):
     scenario = limited(request.param)
     plan = planned(scenario)
-    return scenario, plan, simulate_fused(scenario, plan, build_maps(plan))
+    return scenario, plan, simulate(scenario, plan, build_maps(plan))
 
 
 def speeds(log):

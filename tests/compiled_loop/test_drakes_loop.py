@@ -1,14 +1,12 @@
 """Drake's loop with one block for a sampled team agrees with that of named blocks, row by row."""
 
-import gc
-import weakref
 from dataclasses import fields, replace
 
 import numpy as np
 import pytest
 
 from coop_drake.answers.log import SimulationLog
-from coop_drake.compiled_loop import build_sampled_loop, drakes_loop, prepare, simulate_sampled
+from coop_drake.compiled_loop import prepare
 from coop_drake.scenario import (
     ActuatorLimits,
     BlockedWheels,
@@ -27,6 +25,7 @@ from coop_drake.scenario import (
     WheelSlip,
 )
 from coop_drake.simulation import build_maps, simulate
+from tests.support.sampled_block import build_sampled_loop, simulate_sampled
 from tests.support.small_loop import small_maps, small_problem
 from tests.support.system_checks import port_sizes
 from tests.support.tubes import WITH_AXES, tubed_problem
@@ -118,23 +117,3 @@ def test_ports_of_the_block():
     assert inputs == {"team_state": 2 * (3 + 2)}
     assert outputs == {"efforts": 3 * 2 + 2, "telemetry": 3 + 20 * 2 + 2 * 4}
     loop.release()
-
-
-def test_nothing_outlives_a_run(monkeypatch):
-    scenario, plan = small_problem("base")
-    brief = replace(scenario.simulator, max_time=0.05)
-    transport = prepare(replace(scenario, deployment=PRESET, simulator=brief), plan, small_maps())
-    seen = []
-
-    def watched(*arguments):
-        loop = build_sampled_loop(*arguments)
-        seen.extend(weakref.ref(part) for part in (loop.diagram, loop.controllers, loop.team.plant))
-        return loop
-
-    monkeypatch.setattr(drakes_loop, "build_sampled_loop", watched)
-    gc.disable()  # What a run makes stays young, and the run itself has to find it.
-    try:
-        simulate_sampled(transport)
-    finally:
-        gc.enable()
-    assert [part() for part in seen] == [None, None, None]

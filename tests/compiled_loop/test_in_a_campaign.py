@@ -39,7 +39,6 @@ def test_both_tiers_leave_the_same_record(tmp_path, monkeypatch):
     assert records[0].funnel_margin != records[1].funnel_margin
     found, expected = asdict(records[1]), asdict(drake.record(variation.run(1)))
     assert (found.pop("tier"), expected.pop("tier")) == ("compiled", "drake")
-    assert (found.pop("blocks"), expected.pop("blocks")) == ("", "named")
     assert found.pop("digest") != expected.pop("digest")
     for name in ("run", "scenario", "seed", "values", "arrived", "reason", "funnel_axis", "held"):
         assert found[name] == expected[name]
@@ -50,23 +49,6 @@ def test_both_tiers_leave_the_same_record(tmp_path, monkeypatch):
 
 
 @pytest.mark.slow
-def test_fused_blocks_leave_the_same_record_where_they_know_the_run(tmp_path):
-    records = {}
-    for blocks, hold in (("named", ""), ("fused", ""), ("fused", ", control.hold: {silence: 1.0}")):
-        path = tmp_path / f"{blocks}.campaign.yaml"
-        path.write_text(
-            FILE.replace("tier: both", f"blocks: {blocks}").replace("loss: 0.0", f"loss: 0.0{hold}")
-        )
-        variation = Variation(load_campaign(path))
-        maker = RunMaker(variation, Plans(variation, tmp_path), "drake", tmp_path)
-        records[blocks, hold] = asdict(maker.record(variation.run(0)))
-    (named, fused, held), names = records.values(), ("steps", "funnel_margin", "cell_margin", "peak_force")
-    assert [record["blocks"] for record in records.values()] == ["named", "fused", "named"]
-    assert named["arrived"]
-    assert held["arrived"]
-    assert [fused[name] for name in names] == pytest.approx([named[name] for name in names], abs=1e-9)
-
-
 def test_a_replay_shows_both_tiers_and_refuses_another_run():
     counted = RunRecord(3, "warehouse", "compiled", 7, "{}", arrived=True, time=10.0, steps=2000)
     drake, reporter = replace(counted, tier="drake", time=10.005), Reporter(machine=True, quiet=True)

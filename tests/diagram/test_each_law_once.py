@@ -1,6 +1,6 @@
 """Each law of docs/equations.md is the function that runs: what uses a law changes with the law.
 
-A second copy of a formula, in a block, in the planner or in the fused loop, would not change with the law.
+A second copy of a formula, in a block, in the planner or in the compiled loop, would not change with the law.
 """
 
 import json
@@ -38,8 +38,6 @@ READINESS = {"clearance_margin", "interval_margin", "funnel_margin"}
 
 USERS = {
     "named": MOTION | READINESS | {"wrench_share", "acceleration_at", "object_twist", "robot_effort"},
-    # The fused block reads the object's twist from the plant.
-    "fused": MOTION | READINESS | {"wrench_share", "acceleration_at", "robot_effort"},
     "compiled": MOTION | READINESS | {"wrench_share", "acceleration_at", "object_twist", "robot_effort"},
     "estimate": MOTION | READINESS,
     # The next box is not known, so that the energy of its funnels is no condition.

@@ -20,7 +20,10 @@ BASE = str(Path(__file__).parents[2] / "models" / "base.scenario.yaml")
         (["apart", "supervisor", BASE], "deployment.control_rate"),
         (["run", BASE, "--free-running"], "--free-running needs --apart"),
         (["run", BASE, "--faults", "faults.yaml"], "--faults needs --apart"),
-        (["simulate", BASE, "--apart", "--blocks", "fused"], "do not go together"),
+        (
+            ["simulate", BASE, "--blocks", "fused"],
+            "now nothing: every robot has blocks of its own",
+        ),
         (["verify", "plan.json", BASE, "--braked"], "--braked is about the log of a run"),
     ],
 )

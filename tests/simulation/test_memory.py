@@ -7,7 +7,6 @@ from dataclasses import replace
 import pytest
 from pydrake.systems.framework import Diagram
 
-from coop_drake.compiled_loop import drakes_loop, simulate_fused
 from coop_drake.simulation import run, simulate
 from tests.support.small_loop import small_maps, small_problem
 
@@ -19,10 +18,7 @@ def inside(diagram):
         yield from inside(system) if isinstance(system, Diagram) else [system]
 
 
-@pytest.mark.parametrize(
-    ("simulated", "module"), [(simulate, run), (simulate_fused, drakes_loop)], ids=["named", "fused"]
-)
-def test_no_block_diagram_or_plant_outlives_its_run(simulated, module, monkeypatch):
+def test_no_block_diagram_or_plant_outlives_its_run(monkeypatch):
     seen = []
     build = run.build_closed_loop
 
@@ -31,13 +27,13 @@ def test_no_block_diagram_or_plant_outlives_its_run(simulated, module, monkeypat
         seen.extend(weakref.ref(system) for system in inside(loop.diagram))
         return loop
 
-    monkeypatch.setattr(module, "build_closed_loop", watched)
+    monkeypatch.setattr(run, "build_closed_loop", watched)
     scenario, plan = small_problem("base")
     brief = replace(scenario, simulator=replace(scenario.simulator, max_time=0.05))
     maps = small_maps()
     gc.disable()  # What a run makes stays young, and the run itself has to find it.
     try:
-        log = simulated(brief, plan, maps)
+        log = simulate(brief, plan, maps)
     finally:
         gc.enable()
     assert len(log.times) > 1

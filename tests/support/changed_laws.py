@@ -59,10 +59,9 @@ def restore(law: FunctionType, original: FunctionType) -> None:
 class Loop:
     """A closed loop in the middle of a transition, moving, a short way behind its governor."""
 
-    def __init__(self, blocks: str, plan: Plan) -> None:
+    def __init__(self, plan: Plan) -> None:
         scenario, _ = small_problem()
-        self.loop = build_closed_loop(scenario, plan, small_maps(), blocks=blocks)
-        self.blocks = blocks
+        self.loop = build_closed_loop(scenario, plan, small_maps())
 
     def sample(self):
         """A fresh sample of all that the controllers compute."""
@@ -74,11 +73,7 @@ class Loop:
         z = np.concatenate([transition.target - [0.3, 0.2], axes])
         rates = np.linspace(0.02, 0.05, len(z))
         set_configuration(team, team.plant.GetMyMutableContextFromRoot(root), z, rates)
-        integrators = (
-            [loop.fused.integrator]
-            if loop.fused
-            else [law.GetSubsystemByName("governor_state") for law in loop.bare_controllers]
-        )
+        integrators = [law.GetSubsystemByName("governor_state") for law in loop.bare_controllers]
         for integrator in integrators:
             state = integrator.GetMyMutableContextFromRoot(root)
             integrator.set_integral_value(state, transition.target - [0.25, 0.18])
@@ -162,11 +157,10 @@ def main(names: list[str]) -> None:
     scenario, plan = small_problem()
     sampled = replace(scenario, deployment=Deployment(control_rate=200.0))
     transport = prepare(sampled, plan, small_maps())
-    named, fused = Loop("named", plan), Loop("fused", plan)
+    named = Loop(plan)
     sample = named.sample()
     results = {
         "named": lambda: named.numbers().tolist(),
-        "fused": lambda: fused.numbers().tolist(),
         "estimate": lambda: estimated(plan).tolist(),
         "boxes": lambda: crossed().tolist(),
         "compiled": lambda: compiled_results(transport),

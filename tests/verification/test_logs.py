@@ -5,11 +5,10 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 
-from coop_drake.compiled_loop import simulate_fused
 from coop_drake.errors import RefusalError
 from coop_drake.plant import planning_problem, run_setup
 from coop_drake.scenario import ActuatorLimits, Deployment, Measurements, Messages
-from coop_drake.simulation import build_maps
+from coop_drake.simulation import build_maps, simulate
 from coop_drake.verification.runs import Rows, verify_log
 from coop_drake.verification.runs.nominal_reports import check_nominal_reports
 from tests.support.run_oracle import RunOracle
@@ -35,7 +34,7 @@ ALTERATIONS = 6
 def case():
     """A short run of an ideal team, and all that it is checked against."""
     scenario, plan = small_problem("base")
-    log = simulate_fused(scenario, plan, small_maps())
+    log = simulate(scenario, plan, small_maps())
     return log, (plan, planning_problem(scenario), run_setup(scenario)), RunOracle(scenario, plan)
 
 
@@ -99,7 +98,7 @@ def budgeted():
         messages=Messages(loss=0.2),
     )
     scenario = replace(scenario, deployment=deployment)
-    log = simulate_fused(scenario, plan, build_maps(plan))
+    log = simulate(scenario, plan, build_maps(plan))
     return log, (plan, planning_problem(scenario), run_setup(scenario))
 
 

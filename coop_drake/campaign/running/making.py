@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -27,7 +26,6 @@ from coop_drake.typed_data import DataError
 
 if TYPE_CHECKING:
     from coop_drake.compiled_loop import CompiledTransport, RunOutcome
-    from coop_drake.diagram import Blocks
 
 
 class RunMaker:
@@ -75,7 +73,7 @@ class RunMaker:
                 from coop_drake.compiled_loop.departing import departures_of
 
                 departures_of(self._prepared(scenario, plan, maps), scenario.deployment)
-            else:  # Where fused blocks refuse a run, named ones make it.
+            else:
                 from coop_drake.diagram.closed_loop import build_closed_loop
 
                 build_closed_loop(scenario, plan, maps).release()
@@ -101,8 +99,8 @@ class RunMaker:
             if self._tier == "compiled":
                 outcome = vars(self._compiled(scenario, plan, maps))
                 return replace(begun, digest=digest, **{n: outcome[n] for n in outcome.keys() & vars(begun)})
-            log, blocks = self._simulated(scenario, plan, maps)
-            record = record_of_log(run, begun.scenario, log, plan, digest, blocks)
+            log = self._simulated(scenario, plan, maps)
+            record = record_of_log(run, begun.scenario, log, plan, digest)
         except (OSError, MemoryError):
             raise
         except Exception as error:
@@ -125,15 +123,11 @@ class RunMaker:
             self._models = named, models_digest(scenario)
         return self._models[1]
 
-    def _simulated(self, scenario: Scenario, plan: Plan, maps: Maps) -> tuple[SimulationLog, Blocks]:
-        """Make a run by Drake's loop, and say with which blocks."""
-        from coop_drake.compiled_loop import simulate_fused
+    def _simulated(self, scenario: Scenario, plan: Plan, maps: Maps) -> SimulationLog:
+        """Make a run by Drake's loop."""
         from coop_drake.simulation import simulate
 
-        if self._variation.runs.blocks == "fused":
-            with suppress(ScenarioError):  # Fused blocks have refused it before the run began.
-                return simulate_fused(scenario, plan, maps, prepared=self._prepared), "fused"
-        return simulate(scenario, plan, maps), "named"
+        return simulate(scenario, plan, maps)
 
     def _compiled(self, scenario: Scenario, plan: Plan, maps: Maps) -> RunOutcome:
         """Make a run by the compiled loop."""

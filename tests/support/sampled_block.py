@@ -1,0 +1,299 @@
+"""Drake's loop with the functions of the compiled loop as one block, to compare them with robots' own blocks.
+
+The block stands for the controllers, sensors, messages and actuators of a whole sampled team.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+from pydrake.systems.framework import BasicVector, Context, DiagramBuilder, DiscreteValues
+from pydrake.systems.primitives import Demultiplexer
+
+from coop_drake.answers.log import SimulationLog
+from coop_drake.compiled import compiled, prepared
+from coop_drake.compiled_loop import CompiledTransport
+from coop_drake.compiled_loop.arrays import LoopCells, LoopDepartures, LoopMemory, LoopNominal
+from coop_drake.compiled_loop.departing import believed, departures_of, memory_of, nominal_of
+from coop_drake.compiled_loop.looping import compute, update
+from coop_drake.compiled_loop.robots import ACCELERATION, COMMAND, ENERGY, heard_cell, robot_room
+from coop_drake.compiled_loop.sensing import measure
+from coop_drake.compiled_loop.watching import left_by_all
+from coop_drake.diagram.disturbances import tilt_floor
+from coop_drake.diagram.loop import Loop, Places, PortRow
+from coop_drake.diagram.station import TransportStation, _drive_robots, _measure
+from coop_drake.laws.actuators import lag_behind
+from coop_drake.laws.axis_table import write_bounds
+from coop_drake.laws.sampling import period_of
+from coop_drake.plant import build_team_plant
+from coop_drake.plant.configuration import displacement
+from coop_drake.progress import Progress
+from coop_drake.scenario import Deployment, Scenario
+from coop_drake.simulation.run import run_and_release
+from coop_drake.simulation.telemetry import Sample
+from coop_drake.systems import Block
+from coop_drake.systems.block import NUMBER, VECTOR
+from coop_drake.systems.departure_monitor import ALARM_SIZE
+from coop_drake.systems.nominal_kernels import nominal_margin
+from coop_drake.systems.team_kernels import FusedTeam, read_own
+from coop_drake.tree.pose import FloatArray, IntArray
+
+SHOWN = 20
+"""Numbers that a robot shows: pose of its base (3), p_G (2), Delta E, its report (2), what its monitor says
+(3), then from ``WANTED`` on the object's desired acceleration (3) and the command of the end effector (6)."""
+
+POSE, GOVERNOR, MARGIN, READY, ALARM, WANTED = 0, 3, 5, 6, 8, 11
+"""Where they stand."""
+
+
+@compiled
+def tell(
+    cells: LoopCells, team: FusedTeam, nominal: LoopNominal, departures: LoopDepartures, memory: LoopMemory,
+    sample: int, number: int, now: float, instant: FloatArray, shown: FloatArray, bounds: FloatArray,
+) -> None:  # fmt: skip
+    """Write what the blocks of all robots and the cell planner would show now, before a sample's updates.
+
+    Args:
+        cells: The plan's cells.
+        team: The robots' models.
+        nominal: The nominal motions.
+        departures: What departs.
+        memory: What changes; it is changed as by a sample, so that it must be a copy.
+        sample: Number of the sample, or of the next one between two samples.
+        number: Number of the control period that ``now`` is in.
+        now: Time of the run [s].
+        instant: Receives index of the cell, time of its entry [s], 1 where the team has arrived, (3,).
+        shown: Receives what ``SHOWN`` lists of every robot, shape (N, ``SHOWN``).
+        bounds: Receives lower and upper bounds of the funnels of all axes, shape (2, M) [rad or m].
+    """
+    current, robots = memory.current[sample % memory.current.shape[0]], team.yaws.size
+    cell = int(current[0])
+    arrived = cell + 1 == cells.rows.shape[0] and left_by_all(cell, memory)
+    instant[0], instant[1], instant[2] = current[0], current[1], 1.0 if arrived else 0.0
+    room, robot = robot_room(memory), np.empty(memory.state.size)
+    told = room.told
+    measure(sample, number, team, departures, memory, room.errors)
+    led = memory.nominal[sample % memory.nominal.shape[0]]
+    for k in range(robots):
+        row, begin = shown[k], k + team.first[2, k]
+        end = begin + 1 + team.first[2, k + 1] - team.first[2, k]
+        heard, time = heard_cell(k, sample, now, departures, memory)
+        read_own(k, team.places, team.first, team.base_chains, team.yaws, memory.state, robot)
+        row[POSE : POSE + 3] = robot[:3]
+        row[GOVERNOR : GOVERNOR + 2] = led[4:6] if nominal.flow.size else memory.governors[k]
+        compute(k, sample, number, now, True, cells, team, nominal, departures, room, memory)
+        row[MARGIN] = told[ENERGY]
+        if nominal.flow.size:
+            edges = cells.governed[cells.first[0, heard] : cells.first[0, heard + 1]]
+            row[MARGIN] = nominal_margin(edges, cells.numbers[heard, 1], led)
+        row[READY : READY + 2] = memory.reports[0, k]
+        row[ALARM : ALARM + 3] = memory.alarms[k, :3]
+        row[WANTED:] = told[ACCELERATION : COMMAND + 6]
+        own = np.empty(2 * (end - begin))
+        write_bounds(cells.tables[heard, begin:end], time, own)
+        bounds[0, begin:end], bounds[1, begin:end] = own[: end - begin], own[end - begin :]
+
+
+class SampledTeam(Block):
+    """Computes at every sample what all robots, their sensors, messages and the cell planner compute.
+
+    It calls the functions of the compiled loop, and so the laws that the robots' own blocks call; what it
+    shows agrees with theirs to rounding. With M = N + n axes:
+
+    ======= ============== ============== ============================================================ =====
+    input   ``team_state`` 2 (3 + n)      the plant's positions and velocities, its own order
+    output  ``efforts``    3 N + n        what the actuators of every robot give: its base wrench and  W
+                                          its joint torques [N, N m]
+    output  ``telemetry``  3 + 20 N + 2 M index of the cell, time of its entry [s], 1 where the team   W
+                                          has arrived; what ``SHOWN`` lists of every robot  ; lower,
+                                          then upper bounds of the funnels of all axes
+    ======= ============== ============== ============================================================ =====
+
+    State: one discrete group, updated every period: number of samples so far, time of the last one, then all
+    fields of ``LoopMemory`` but the plant's state, one after the other.
+
+    Args:
+        cells: The plan's cells.
+        team: The robots' models.
+        nominal: The nominal motions.
+        departures: What departs.
+        memory: What is remembered at the start.
+    """
+
+    def __init__(
+        self, cells: LoopCells, team: FusedTeam, nominal: LoopNominal, departures: LoopDepartures,
+        memory: LoopMemory,
+    ) -> None:  # fmt: skip
+        super().__init__()
+        known, self._robots, self._axes = (
+            (cells, team, nominal, departures),
+            team.yaws.size,
+            memory.jumps.size,
+        )
+        self._period, lag = float(departures.times[0]), float(departures.times[2])
+        kept = memory._asdict()
+        del kept["state"]
+        ends = 2 + np.cumsum([part.size for part in kept.values()])
+        self._parts = {
+            name: (slice(int(end) - part.size, int(end)), part.shape)
+            for (name, part), end in zip(kept.items(), ends, strict=True)
+        }
+        self._efforts = self._parts["efforts"][0]
+        shown, bounds = np.empty((self._robots, SHOWN)), np.empty((2, self._axes))
+        self._tell = prepared(tell, known, memory, 0, 0, NUMBER, VECTOR, shown, bounds)
+        self._update = prepared(update, (*known, robot_room(memory)), memory, 0)
+        self._follow = prepared(lag_behind, [lag], NUMBER, VECTOR, VECTOR, VECTOR)
+        self._state = self.DeclareVectorInputPort("team_state", memory.state.size)
+        start = np.concatenate([[0.0, 0.0], *(part.ravel() for part in kept.values())])
+        group = self.discrete_state_ticket(self.DeclareDiscreteState(start))
+        timed = {group, self.time_ticket()} if lag > 0.0 else {group}
+        self.DeclareVectorOutputPort("efforts", memory.efforts.shape[1], self._write_efforts, timed)
+        size = 3 + shown.size + bounds.size
+        self.DeclareVectorOutputPort("telemetry", size, self._write_telemetry)
+        self.declare_update(self._step, self._period)
+
+    def _remembered(self, flat: FloatArray, team_state: FloatArray) -> LoopMemory:
+        """Return the fields of ``LoopMemory`` as views of the state."""
+        views = {name: flat[part].reshape(shape) for name, (part, shape) in self._parts.items()}
+        return LoopMemory(state=team_state, **views)
+
+    def _write_efforts(self, context: Context, output: BasicVector) -> None:
+        flat = context.get_discrete_state_vector().value()
+        held, before = flat[self._efforts].reshape(2, -1)
+        self._follow(context.get_time() - float(flat[1]), held, before, output.get_mutable_value())
+
+    def _write_telemetry(self, context: Context, output: BasicVector) -> None:
+        flat, now = context.get_discrete_state_vector().value().copy(), context.get_time()
+        told, begin = output.get_mutable_value(), 3 + self._robots * SHOWN
+        self._tell(
+            self._remembered(flat, self._state.Eval(context)),
+            int(flat[0]),
+            period_of(now, self._period),
+            now,
+            told[:3],
+            told[3:begin].reshape(-1, SHOWN),
+            told[begin:].reshape(2, -1),
+        )
+
+    def _step(self, context: Context, discrete_state: DiscreteValues) -> None:
+        flat, now = discrete_state.get_mutable_vector().get_mutable_value(), context.get_time()
+        memory = self._remembered(flat, self._state.Eval(context))
+        held, before = memory.efforts
+        self._follow(now - float(flat[1]), held, before, before)
+        self._update(memory, int(flat[0]))
+        flat[0], flat[1] = flat[0] + 1.0, now
+
+
+@dataclass(frozen=True)
+class SampledLoop(Loop):
+    """Drake's plant, and one block that computes what a sampled team computes.
+
+    Attributes:
+        controllers: The block.
+        axis_rows: Row among the M axes of (theta, q), shape (1 + n,).
+    """
+
+    controllers: SampledTeam
+    axis_rows: IntArray
+
+    def places(self, ports: PortRow) -> Places:
+        """Add all outputs that are logged, and return where they stand."""
+        robots = self.team.robots
+        told, efforts = ports.add(self.controllers, "telemetry"), ports.add(self.controllers, "efforts")
+        ends = 3 + SHOWN * len(robots)
+        shown, bounds = told[3:ends].reshape(-1, SHOWN), told[ends:].reshape(2, -1)
+        own = np.split(efforts, np.cumsum([3 + len(robot.joints) for robot in robots])[:-1])
+        realised = ports.add(self.station.diagram, "generalized_acceleration")[self.team.velocity_index]
+        nothing = np.empty(0, dtype=np.intp)
+        return Places(
+            instant=told[:3],
+            base_poses=shown[:, POSE : POSE + 3],
+            governors=shown[:, GOVERNOR : GOVERNOR + 2],
+            funnel_lower=bounds[0, self.axis_rows],
+            funnel_upper=bounds[1, self.axis_rows],
+            energy_margins=shown[:, MARGIN],
+            commanded_wrenches=shown[:, SHOWN - 3 :],
+            base_wrenches=np.array([effort[:3] for effort in own]),
+            joint_torques=np.concatenate([effort[3:] for effort in own]),
+            accelerations=shown[:, WANTED : WANTED + 3],
+            realised=realised,
+            ready_margins=shown[:, READY + 1],
+            clock_lag=nothing,
+            causes=nothing,
+            alarms=shown[:, ALARM : ALARM + ALARM_SIZE],
+        )
+
+
+def build_sampled_loop(transport: CompiledTransport, deployment: Deployment | None = None) -> SampledLoop:
+    """Build Drake's loop of a transport with one block in place of sensors, controllers and messages.
+
+    Args:
+        transport: What ``prepare`` returned.
+        deployment: The departures; None for those of the scenario that was prepared.
+
+    Raises:
+        ScenarioError: The compiled loop does not know what departs.
+    """
+    deployment = transport.scenario.deployment if deployment is None else deployment
+    departures = departures_of(transport, deployment)
+    block = SampledTeam(
+        transport.cells,
+        believed(transport.team, deployment.mass_error),
+        nominal_of(transport, float(departures.times[0])),
+        departures,
+        memory_of(transport, departures),
+    )
+    builder = DiagramBuilder()
+    station = _driven_station(replace(transport.scenario, deployment=deployment))
+    diagram, robots = station.diagram, station.team.robots
+    builder.AddNamedSystem("transport_station", diagram)
+    builder.AddNamedSystem("sampled_team", block)
+    parts = builder.AddNamedSystem("efforts", Demultiplexer([3 + len(robot.joints) for robot in robots]))
+    builder.Connect(diagram.GetOutputPort("team_state"), block.GetInputPort("team_state"))
+    builder.Connect(block.GetOutputPort("efforts"), parts.get_input_port())
+    for k in range(len(robots)):
+        builder.Connect(parts.get_output_port(k), diagram.GetInputPort(f"robot_{k}_effort"))
+    rows = transport.plant.axis_rows[0]
+    start = transport.plan.start + displacement(deployment, len(transport.plan.start))
+    return SampledLoop(builder.Build(), station, transport.plan, start, block, rows)
+
+
+def simulate_sampled(
+    transport: CompiledTransport,
+    deployment: Deployment | None = None,
+    *,
+    progress: Progress | None = None,
+    observer: Callable[[Sample], None] | None = None,
+) -> SimulationLog:
+    """Run Drake's loop of a transport with one block in place of all controllers.
+
+    The log agrees with that of :func:`coop_drake.simulation.simulate` to rounding.
+
+    Args:
+        transport: What ``prepare`` returned.
+        deployment: The departures; None for those of the scenario that was prepared.
+        progress: Called with the stage and the fraction done, if given.
+        observer: Called with every accepted step, if given.
+
+    Raises:
+        ScenarioError: The compiled loop does not know what departs.
+    """
+    deployment = transport.scenario.deployment if deployment is None else deployment
+    scenario = replace(transport.scenario, deployment=deployment)
+    build = partial(build_sampled_loop, transport, deployment)
+    return run_and_release(build, scenario, progress=progress, observer=observer)
+
+
+def _driven_station(scenario: Scenario) -> TransportStation:
+    """Build the ideal team's plant as a station that also shows the plant's state, for the block."""
+    builder = DiagramBuilder()
+    team = build_team_plant(scenario, builder)
+    tilt_floor(team, scenario.deployment.floor)
+    _drive_robots(builder, team, _measure(builder, team))
+    builder.ExportOutput(team.plant.get_state_output_port(), "team_state")
+    builder.ExportOutput(team.plant.get_generalized_acceleration_output_port(), "generalized_acceleration")
+    builder.ExportOutput(team.scene_graph.get_query_output_port(), "query_object")
+    return TransportStation(builder.Build(), team)
