@@ -106,10 +106,8 @@ def _sizes(_: Sequence[Row]) -> list[Row]:
     """Return the bytes of a run in the file of a batch."""
     from pyarrow import parquet
 
-    (transport, _maps), varied = (
-        _transport("base", "budget"),
-        np.random.default_rng(0).uniform(-0.2, 0.2, BATCH),
-    )
+    transport, _maps = _transport("base", "budget")
+    varied = np.random.default_rng(0).uniform(-0.2, 0.2, BATCH)
     records = []
     for index, error in enumerate(varied.tolist()):
         deployment = replace(transport.scenario.deployment, mass_error=error, seed=index)
