@@ -24,7 +24,7 @@ from coop_drake.campaign.records import RunRecord, table_of
 from coop_drake.campaign.variation import Run
 from coop_drake.compiled_loop import CompiledTransport, prepare, run
 from coop_drake.errors import PlanError
-from coop_drake.fields import HarmonicMap
+from coop_drake.harmonic_maps import HarmonicMap
 from coop_drake.kernel_times import KERNEL_TIMES
 from coop_drake.simulation import simulate
 
