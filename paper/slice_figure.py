@@ -18,7 +18,7 @@ from coop_drake.drawing.floor import draw_polygon, draw_team, draw_workspace
 from coop_drake.geometry.body_pairs import BodyPairs
 from coop_drake.geometry.swept_tree import Intervals, SweptTree
 from coop_drake.planning.cells.cells import CellMaker, Region
-from coop_drake.watching.floor_panel import draw_section
+from coop_drake.watching.pictures import draw_section
 
 __all__ = ["slice_figure"]
 

@@ -9,10 +9,15 @@ import numpy as np
 
 from coop_drake.compiled_loop.arrays import LoopDepartures, LoopMemory, LoopNominal
 from coop_drake.compiled_loop.preparing import CompiledTransport
-from coop_drake.diagram.disturbances import blocked_times, downhill, wheel_slips
+from coop_drake.diagram.deployment import (
+    clock_shift,
+    effort_limits,
+    measurement_deviations,
+    measurement_waves,
+    seed_of,
+)
 from coop_drake.diagram.knowledge import report_periods
-from coop_drake.diagram.radio import seed_of
-from coop_drake.diagram.wrapping import clock_shift, effort_limits, measurement_deviations, measurement_waves
+from coop_drake.diagram.station import blocked_times, downhill, wheel_slips
 from coop_drake.errors import ScenarioError
 from coop_drake.laws.arrival import mean_samples
 from coop_drake.laws.axis_table import first_jumps

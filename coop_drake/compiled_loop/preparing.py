@@ -26,7 +26,7 @@ from coop_drake.plant import (
 )
 from coop_drake.scenario import Scenario
 from coop_drake.simulation.clearance import TeamClearance
-from coop_drake.simulation.stall import patience
+from coop_drake.simulation.watch import patience
 from coop_drake.systems import axis_laws
 from coop_drake.systems.nominal_kernels import NOTHING
 from coop_drake.systems.team_kernels import FusedTeam

@@ -12,9 +12,8 @@ from coop_drake.answers.plan import Plan
 from coop_drake.diagram.deployment import DeployedController, deploy
 from coop_drake.diagram.hold import add_supervisor
 from coop_drake.diagram.knowledge import hold_of, robot_knowledge
-from coop_drake.diagram.loop import Loop, Places, PortRow
 from coop_drake.diagram.robot_controller import TELEMETRY, Replacements, build_robot_controller
-from coop_drake.diagram.station import build_station
+from coop_drake.diagram.station import Loop, Places, PortRow, build_station
 from coop_drake.harmonic_maps import HarmonicMap
 from coop_drake.plant.configuration import displacement
 from coop_drake.scenario import Scenario

@@ -2,18 +2,343 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
-from pydrake.systems.framework import Context, Diagram, DiagramBuilder
-from pydrake.systems.primitives import PassThrough
+from pydrake.systems.framework import Context, Diagram, DiagramBuilder, InputPort, LeafSystem, OutputPort
+from pydrake.systems.primitives import (
+    AffineSystem,
+    Demultiplexer,
+    DiscreteTimeDelay,
+    FirstOrderLowPassFilter,
+    Gain,
+    LinearSystem,
+    Multiplexer,
+    PassThrough,
+    TrajectorySource,
+    ZeroOrderHold,
+)
+from pydrake.trajectories import PiecewisePolynomial
 
 from coop_drake.diagram.robot_controller import TELEMETRY
-from coop_drake.diagram.wrapping import Holding, Wrapping
-from coop_drake.scenario import Deployment
-from coop_drake.systems import LossyMeasurement, build_selector
+from coop_drake.laws.channels import NOTHING
+from coop_drake.laws.random_draws import uniform_pair
+from coop_drake.laws.sampling import whole_periods
+from coop_drake.scenario import Deafness, Deployment, Messages, PoseBias, RobotDepartures, Silence
+from coop_drake.systems import (
+    Interruption,
+    LaggingEffort,
+    LimitedEffort,
+    LossyMeasurement,
+    MeasurementNoise,
+    MessageChannel,
+    ShiftedMeasurement,
+    build_selector,
+    clear_channel,
+)
 from coop_drake.tree.pose import FloatArray
+
+
+def build_radio(deployment: Deployment, robot: int, use: int = 0) -> MessageChannel | LinearSystem:
+    """Build the channel of a robot's reports in a sampled team.
+
+    The use of the seed is 3 for its requests to the hold supervisor, and 4 for what it hears of this.
+    """
+    messages, period = deployment.messages, deployment.period or 0.0
+    if messages == Messages():
+        return clear_channel(period)
+    return MessageChannel(
+        period,
+        delay=messages.delay,
+        loss=messages.loss,
+        repeat=messages.repeat,
+        seed=seed_of(deployment, robot, use),
+    )
+
+
+def seed_of(deployment: Deployment, robot: int, use: int = 0) -> int:
+    """Return the seed of what is drawn for a robot; each use has its own.
+
+    The use is 0 for losses of reports, 1 and 2 for those of measurements of the object and of the robot, 3
+    and 4 for those of messages about holds, 5 and 6 for the noise of these measurements, 7 for the clock.
+    """
+    words = [deployment.seed, robot, use] if use else [deployment.seed, robot]
+    return int(np.random.SeedSequence(words).generate_state(1)[0])
+
+
+# The blocks that a deployment puts between one robot's controller and the rest of the loop.
+
+
+Holding: TypeAlias = DiscreteTimeDelay | ZeroOrderHold | LossyMeasurement | ShiftedMeasurement
+"""Blocks that hold measurements."""
+
+NOISE_USES = {"object_pose": 5, "robot_state": 6}
+"""Uses of the seeds of the noise of what is measured, see ``seed_of``."""
+
+CLOCK_USE = 7
+"""Use of the seed of a robot's clock."""
+
+LOSS_USES = {"object_pose": 1, "robot_state": 2}
+"""Uses of the seeds of its losses."""
+
+_STRONGEST = 1e5
+"""Limit of every effort where the scenario gives none [N, N m]. A controller outside its funnel may ask for
+any effort; without a limit the plant's state would overflow, which ends the process instead of the run."""
+
+_CLOCK = PiecewisePolynomial.FirstOrderHold([0.0, 1e6], [[0.0, 1e6]])
+"""The time as a function of itself [s]."""
+
+_KILO = 1e3
+"""Unit of the lagging efforts [N, N m]. The integrator's error control compares states of all units with one
+number; efforts in newtons would ask for a thousandth of a newton, and for very short steps."""
+
+
+class Wrapping:
+    """Adds to a builder the blocks that a deployment asks for round one robot's controller."""
+
+    def __init__(self, builder: DiagramBuilder, deployment: Deployment, robot: int, name: str) -> None:
+        self._builder, self._deployment, self._robot = builder, deployment, robot
+        self._own = deployment.of_robot(name)
+        self.delays: list[Holding] = []
+        self.heard: list[Holding] = []
+
+    def measure(self, entry: InputPort) -> None:
+        """Export an input of the controller with its constant errors, noise, delay and losses."""
+        name, size = entry.get_name(), entry.size()
+        self._lead(entry, self._sensed(name, size) + self._carried(name, size))
+
+    def measure_stamped(self, entry: InputPort) -> OutputPort:
+        """Do the same, and return when what the controller gets was measured [s].
+
+        The time of the measurement goes with it through all that delays or loses it.
+        """
+        name, size = entry.get_name(), entry.size()
+        joined, parted, sensed = Multiplexer([size, 1]), Demultiplexer([size, 1]), self._sensed(name, size)
+        carried = [(f"{name}_stamped", joined), *self._carried(name, 1 + size), (f"{name}_parted", parted)]
+        self._lead(entry, sensed + carried)
+        clock = self._builder.AddNamedSystem(f"{name}_clock", TrajectorySource(_CLOCK))
+        shifted = _affine(np.ones(1), np.array([-clock_shift(self._deployment, self._robot)]))
+        stamp = self._append(clock.get_output_port(0), [(f"{name}_instant", shifted)])
+        self._builder.Connect(stamp, joined.get_input_port(1))
+        return parted.get_output_port(1)
+
+    def _sensed(self, name: str, size: int) -> list[tuple[str, LeafSystem]]:
+        """Return the blocks of a measurement's errors."""
+        period, shift = self._deployment.period, clock_shift(self._deployment, self._robot)
+        blocks: list[tuple[str, LeafSystem | None]]
+        blocks = [(f"{name}_biased", _distortion(self._own, name, size))]
+        if period is not None and shift:
+            shifted = ShiftedMeasurement(size, shift / period, period, self._own.sample_offset)
+            blocks.append((f"{name}_shifted", shifted))
+            self.delays.append(shifted)
+        if period is not None:
+            blocks.append((f"{name}_measured", self._noise(name, size, period)))
+        return [(label, block) for label, block in blocks if block is not None]
+
+    def _carried(self, name: str, size: int) -> list[tuple[str, LeafSystem]]:
+        """Return the blocks that delay or lose a measurement on its way."""
+        measurements, period = self._deployment.measurements, self._deployment.period
+        if period is None:
+            return []
+        delays = self._delays(size, whole_periods(measurements.delay, period))
+        blocks = [*((f"{name}_delay{i or ''}", delay) for i, delay in enumerate(delays))]
+        if (lossy := self._losses(name, size, period)) is not None:
+            blocks.append((f"{name}_received", lossy))
+        self.delays.extend(block for _, block in blocks if isinstance(block, Holding))
+        return blocks
+
+    def hear(self, entry: InputPort) -> None:
+        """Export the input of the current cell, which a robot may hear late and time by a wrong clock."""
+        blocks: list[tuple[str, LeafSystem]] = []
+        if self._own.clock_error:
+            blocks.append(("clock_error", _affine(np.ones(2), np.array([0.0, -self._own.clock_error]))))
+        if self._deployment.period is not None:
+            delays = self._delays(2, whole_periods(self._own.switch_delay, self._deployment.period))
+            self.heard.extend(delays)
+            blocks.extend((f"switch_delay{i or ''}", delay) for i, delay in enumerate(delays))
+        self._lead(entry, blocks)
+
+    def obey(self, entry: InputPort) -> None:
+        """Export the input of the hold supervisor's messages, which may be lost, late or not heard."""
+        blocks: list[tuple[str, LeafSystem]] = []
+        if self._deployment.messages != Messages():
+            blocks.append(("holds_radio", build_radio(self._deployment, self._robot, 4)))
+        if (deaf := self._own.deaf) is not None:
+            blocks.append(("deafness", self._interruption(entry.size(), deaf, held=True)))
+        self._lead(entry, blocks)
+
+    def command(self, effort: OutputPort) -> OutputPort:
+        """Return the effort that a robot asks of its actuators in each period: after failures, held."""
+        size, period, silence = effort.size(), self._deployment.period, self._own.silence
+        if period is None:
+            return effort
+        blocks: list[tuple[str, LeafSystem]] = []
+        if silence is not None and silence.motors != "working":
+            blocks.append(("motors", self._interruption(size, silence, held=silence.motors == "held")))
+        blocks.append(("effort_hold", ZeroOrderHold(period, size, self._own.sample_offset)))
+        return self._append(effort, blocks)
+
+    def actuate(self, effort: OutputPort) -> OutputPort:
+        """Return the effort of the actuators: after limits and lag."""
+        size = effort.size()
+        limits = effort_limits(self._deployment, size - 3)
+        blocks: list[tuple[str, LeafSystem]] = [("actuator_limits", LimitedEffort(limits))]
+        lag, period = self._deployment.actuators.lag, self._deployment.period
+        if lag and period is not None:
+            blocks.append(("actuator_lag", LaggingEffort(size, lag, period, self._own.sample_offset)))
+        elif lag:
+            blocks.append(("effort_in_kilonewtons", Gain(1.0 / _KILO, size)))
+            blocks.append(("actuator_lag", FirstOrderLowPassFilter(lag, size)))
+            blocks.append(("lagged_effort", Gain(_KILO, size)))
+        return self._append(effort, blocks)
+
+    def send(self, message: OutputPort, name: str = "reports", use: int = 0) -> OutputPort:
+        """Return the reports of a robot as the cell planner receives them, or its requests likewise.
+
+        Args:
+            message: The port that sends.
+            name: What the messages are called in the names of blocks.
+            use: Of the seed of what is lost, see ``seed_of``.
+        """
+        period, silence, offset = self._deployment.period, self._own.silence, self._own.sample_offset
+        if period is None:
+            return message
+        blocks: list[tuple[str, LeafSystem]] = []
+        if silence is not None:
+            before = NOTHING if use == 0 else 0.0
+            blocks.append((name, self._interruption(message.size(), silence, held=True, before=before)))
+        if offset:
+            blocks.append((f"{name}_of_samples", ZeroOrderHold(period, message.size(), offset)))
+        radio = build_radio(self._deployment, self._robot, use)
+        return self._append(message, [*blocks, ("radio" if use == 0 else f"{name}_radio", radio)])
+
+    def _append(self, port: OutputPort, blocks: Iterable[tuple[str, LeafSystem]]) -> OutputPort:
+        """Add blocks one after the other behind an output, and return the last one's output."""
+        for name, block in blocks:
+            self._builder.AddNamedSystem(name, block)
+            self._builder.Connect(port, block.get_input_port(0))
+            port = block.get_output_port(0)
+        return port
+
+    def _lead(self, entry: InputPort, blocks: Sequence[tuple[str, LeafSystem]]) -> None:
+        """Add blocks one after the other before an input, and export the first one's input by its name."""
+        name = entry.get_name()
+        for label, block in reversed(blocks):
+            if not self._builder.HasSubsystemNamed(label):
+                self._builder.AddNamedSystem(label, block)
+            self._builder.Connect(block.get_output_port(0), entry)
+            entry = block.get_input_port(0)
+        self._builder.ExportInput(entry, name)
+
+    def _noise(self, name: str, size: int, period: float) -> MeasurementNoise | None:
+        """Return the block that adds noise and waves to a measured port, None if there are neither."""
+        deviations = measurement_deviations(self._deployment, name, size)
+        waves = measurement_waves(self._deployment, name, size, period)
+        if not deviations.any() and not waves[:, 0].any():
+            return None
+        seed = seed_of(self._deployment, self._robot, NOISE_USES[name])
+        return MeasurementNoise(deviations, waves, period, seed)
+
+    def _delays(self, size: int, periods: int) -> list[Holding]:
+        """Return the blocks that delay a signal by a number of control periods.
+
+        Controllers compute at the instant at which a block takes its next sample, and before it does: one
+        period of the delay is already this.
+        """
+        period, offset = self._deployment.period, self._own.sample_offset
+        assert period is not None
+        if periods == 0:
+            return []
+        if offset == 0.0:
+            return [DiscreteTimeDelay(period, periods - 1, size)]
+        return [ZeroOrderHold(period, size, offset) for _ in range(periods)]
+
+    def _losses(self, name: str, size: int, period: float) -> LossyMeasurement | None:
+        m = self._deployment.measurements
+        if m.loss == 0.0 and m.late == 0.0:
+            return None
+        return LossyMeasurement(
+            size,
+            period,
+            loss=m.loss,
+            late=m.late,
+            late_by=m.late_by,
+            offset=self._own.sample_offset,
+            seed=seed_of(self._deployment, self._robot, LOSS_USES[name]),
+        )
+
+    def _interruption(
+        self, size: int, silence: Silence | Deafness, *, held: bool, before: float = 0.0
+    ) -> Interruption:
+        return Interruption(
+            size,
+            self._deployment.period or 0.0,
+            begin=silence.begin,
+            duration=silence.duration,
+            held=held,
+            offset=self._own.sample_offset,
+            before=before,
+        )
+
+
+def clock_shift(deployment: Deployment, robot: int) -> float:
+    """Return by how much earlier a robot's sensors measure than it takes them to [s]; negative for later.
+
+    It is drawn once for the run. Nothing is measured later than it is used.
+    """
+    most = deployment.clock_error
+    if not most:
+        return 0.0
+    drawn = uniform_pair(seed_of(deployment, robot, CLOCK_USE), 0)[0]
+    return max((2.0 * drawn - 1.0) * most, -deployment.whole_delay)
+
+
+def measurement_deviations(deployment: Deployment, name: str, size: int) -> FloatArray:
+    """Return the standard deviations of (x, y, angle), or of (x, y, angle, joints..., their rates)."""
+    m = deployment.measurements
+    count = 3 if name == "object_pose" else size // 2
+    positions = [m.position_noise, m.position_noise, *[m.angle_noise] * (count - 2)]
+    return np.array([*positions, *[m.rate_noise] * (size - count)])
+
+
+def measurement_waves(deployment: Deployment, name: str, size: int, period: float) -> FloatArray:
+    """Return size, length in periods and phase of the waves of these components, shape (size, 3)."""
+    waves = deployment.measurements.waves.of_port(name, size)
+    return np.array([[wave.size, wave.period / period, wave.phase] for wave in waves])
+
+
+def _distortion(own: RobotDepartures, name: str, size: int) -> AffineSystem | None:
+    """Return the block of the constant errors of what a robot measures; None if it has none."""
+    factors, offsets = np.ones(size), np.zeros(size)
+    if name == "object_pose":
+        offsets += own.pose_bias.x, own.pose_bias.y, own.pose_bias.theta
+    else:
+        rates = size // 2
+        factors[rates : rates + 3] += own.odometry_scale
+    return None if own.pose_bias == PoseBias() and own.odometry_scale == 0.0 else _affine(factors, offsets)
+
+
+def _affine(factors: FloatArray, offsets: FloatArray) -> AffineSystem:
+    """Return Drake's block of y_i = f_i u_i + o_i, which has no state."""
+    n, none = len(factors), np.zeros(0)
+    return AffineSystem(
+        A=np.zeros((0, 0)), B=np.zeros((0, n)), f0=none, C=np.zeros((n, 0)), D=np.diag(factors), y0=offsets
+    )
+
+
+def effort_limits(deployment: Deployment, joints: int) -> FloatArray:
+    """Return the largest force and torque of a base and the largest efforts of joints, shape (2 + n,)."""
+    limits = deployment.actuators
+    force, torque, effort = (
+        _STRONGEST if limit is None else limit
+        for limit in (limits.base_force, limits.base_torque, limits.joint_effort)
+    )
+    return np.array([force, torque, *[effort] * joints])
+
+
+# A robot's controller with sensors, actuators and radio, where the team is not ideal.
 
 
 @dataclass(frozen=True)

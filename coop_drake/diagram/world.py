@@ -9,11 +9,9 @@ import numpy as np
 from pydrake.systems.framework import Context, DiagramBuilder
 
 from coop_drake.answers.plan import Plan
-from coop_drake.diagram.deployment import Body, build_body
+from coop_drake.diagram.deployment import Body, build_body, effort_limits
 from coop_drake.diagram.knowledge import hold_of
-from coop_drake.diagram.loop import Loop, Places, PortRow
-from coop_drake.diagram.station import build_station
-from coop_drake.diagram.wrapping import effort_limits
+from coop_drake.diagram.station import Loop, Places, PortRow, build_station
 from coop_drake.errors import ScenarioError
 from coop_drake.laws.braking import Brake, braking_damping
 from coop_drake.plant import TeamPlant

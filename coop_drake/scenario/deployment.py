@@ -1,8 +1,8 @@
 """Departures of a real team from the ideal one: what is sampled, noisy, late, limited, wrong, lost or pushed.
 
 This file holds the values alone; :mod:`coop_drake.scenario.deployment_checks` refuses values that do not fit
-together. Three files apply them: :mod:`coop_drake.diagram.wrapping` puts blocks between every controller and
-the plant, :mod:`coop_drake.diagram.disturbances` adds forces to those of the robots, and
+together. Three files apply them: :mod:`coop_drake.diagram.deployment` puts blocks between every controller
+and the plant, :mod:`coop_drake.diagram.station` adds forces to those of the robots, and
 :mod:`coop_drake.diagram.knowledge` makes the controllers' model of the team, in which ``mass_error`` acts. A
 new departure is a field here, a block there, tests in ``tests/diagram/test_deployment.py``, a mild and a
 harsh case in ``tests/closed_loop/test_deployment.py``, a row of ``docs/how_to/deployment.md``, wrong values

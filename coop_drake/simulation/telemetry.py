@@ -8,7 +8,7 @@ import numpy as np
 from pydrake.systems.framework import Context
 
 from coop_drake.compiled import prepared
-from coop_drake.diagram.loop import Loop, Places, PortRow
+from coop_drake.diagram.station import Loop, Places, PortRow
 from coop_drake.laws import total_wrench
 from coop_drake.simulation.step_kernels import row_figures
 from coop_drake.systems.block import NUMBER

@@ -41,11 +41,8 @@ from coop_drake.geometry.parts import parts_of
 from coop_drake.geometry.swept_tree import Interval
 from coop_drake.planning.cells.graph import Kind
 from coop_drake.tree.pose import FloatArray
-from coop_drake.watching.channel_path import PathPiece
-from coop_drake.watching.keyframes import Keyframe
-from coop_drake.watching.projections import union
+from coop_drake.watching.keyframes import THETA, Keyframe, PathPiece, layers, on_turn, union
 from coop_drake.watching.recording import SearchRecording
-from coop_drake.watching.theta_layers import THETA, layers, on_turn
 
 _EXTENT, _BOTTOM, _TOP = 10.0, 0.5, 6.5
 """Larger side of the floor, and heights at which the turn of theta begins and ends [units]."""

@@ -9,7 +9,7 @@ from pydrake.systems.framework import DiagramBuilder
 from coop_drake.planning.planner import plan
 from coop_drake.plant import build_team_plant, planning_problem
 from coop_drake.simulation import build_maps, simulate
-from coop_drake.simulation.joint_limits import joint_limits_kept_by_funnels
+from coop_drake.simulation.run import joint_limits_kept_by_funnels
 from tests.support.small_scenario import small_scenario
 
 # Drake warns once per process, at the first reaction force of a continuous plant whose joints have limits.

@@ -22,9 +22,15 @@ from coop_drake.compiled_loop.looping import compute, update
 from coop_drake.compiled_loop.robots import ACCELERATION, COMMAND, ENERGY, heard_cell, robot_room
 from coop_drake.compiled_loop.sensing import measure
 from coop_drake.compiled_loop.watching import left_by_all
-from coop_drake.diagram.disturbances import tilt_floor
-from coop_drake.diagram.loop import Loop, Places, PortRow
-from coop_drake.diagram.station import TransportStation, _drive_robots, _measure
+from coop_drake.diagram.station import (
+    Loop,
+    Places,
+    PortRow,
+    TransportStation,
+    _drive_robots,
+    _measure,
+    tilt_floor,
+)
 from coop_drake.laws.actuators import lag_behind
 from coop_drake.laws.axis_table import write_bounds
 from coop_drake.laws.sampling import period_of

@@ -14,10 +14,9 @@ from coop_drake.planning.cells.graph import Kind
 from coop_drake.planning.cells.slices import holds, share_facet
 from coop_drake.tree.circles import nearest_turn
 from coop_drake.watching import keyframes, record_search
-from coop_drake.watching.angle_panels import cut
-from coop_drake.watching.projections import projection_of
+from coop_drake.watching.keyframes import THETA, layers, on_turn, projection_of
+from coop_drake.watching.pictures import cut
 from coop_drake.watching.recording import BOXES
-from coop_drake.watching.theta_layers import THETA, layers, on_turn
 from tests.watching.rods import NARROW, WIDE, jointed_rod, rod_recording
 
 

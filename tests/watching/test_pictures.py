@@ -16,9 +16,8 @@ from PIL import Image
 
 from coop_drake.drawing.colours import CHANNEL, REACHED, UNDECIDED, UNREACHED
 from coop_drake.watching import keyframes, scene_page, write_pictures
-from coop_drake.watching.keyframe_figure import keyframe_figure
-from coop_drake.watching.pictures import on_sheet
-from coop_drake.watching.theta_layers import on_turn
+from coop_drake.watching.keyframes import on_turn
+from coop_drake.watching.pictures import keyframe_figure, on_sheet
 from tests.watching.rods import NARROW, WIDE, rod_recording
 
 
