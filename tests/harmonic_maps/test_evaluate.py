@@ -129,6 +129,7 @@ def test_leaves_share_out_the_square(mapped):
 
 
 @pytest.mark.slow
+@pytest.mark.slow
 def test_sharp_corners_of_many_nodes_fit():
     domain, goal = domains.needle(1.05)
     harmonic_map = HarmonicMap(domain, goal)

@@ -386,7 +386,13 @@ AGAINST_SINGLE_LAYER = {
 ACCURACY = 4e-4  # of the oracle, whose elements are constant
 
 
-@pytest.mark.parametrize("name", AGAINST_SINGLE_LAYER)
+SLOW = {"maze", "Minkowski, round"}
+
+
+@pytest.mark.parametrize(
+    "name",
+    [pytest.param(n, marks=[pytest.mark.slow] if n in SLOW else []) for n in AGAINST_SINGLE_LAYER],
+)
 def test_map_and_jacobian_agree_with_a_single_layer(name):
     domain, goal, elements = AGAINST_SINGLE_LAYER[name]
     harmonic_map = HarmonicMap(domain, goal, tolerance=1e-6)

@@ -3,6 +3,7 @@
 from itertools import pairwise
 
 import numpy as np
+import pytest
 import shapely
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
@@ -52,6 +53,7 @@ def unit(velocity):
     return velocity / np.hypot(*velocity)
 
 
+@pytest.mark.slow
 def test_no_streamline_leaves_its_cell_and_all_but_a_null_set_arrive(record_property):
     rng = np.random.default_rng(4)
     count, lost, slow = 0, {True: 0, False: 0}, 0
