@@ -63,6 +63,8 @@ class BoundedDepartures:
         yield from (f"share of {name}" for name in _SHARES)
         yield "model_error"
         yield from _DELAYS
+        if self.budget.rubs:
+            yield "joint_friction"
         yield from (f"{START}{axis}" for axis in ("x", "y", "theta"))
         yield from (f"{START}joint {i}" for i in range(len(self._tree.joints)))
 
@@ -87,6 +89,9 @@ class BoundedDepartures:
         values["deployment.measurements.delay"] = budget.delay * given["delay"]
         values["deployment.actuators.lag"] = budget.lag * (_LEAST_LAG + (1.0 - _LEAST_LAG) * given["lag"])
         values["deployment.messages.delay"] = budget.report_age * given["report_age"]
+        if budget.rubs:
+            for name, size in (("coulomb", budget.joint_coulomb), ("viscous", budget.joint_viscous)):
+                values[f"deployment.joint_friction.{name}"] = size * given["joint_friction"]
         return values | self._start(given, budget)
 
     def _start(self, given: Mapping[str, float], budget: Budget) -> dict[str, Any]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated
 
-from coop_drake.typed_data import EXACT, Positive
+from coop_drake.typed_data import EXACT, NotNegative, Positive
 
 _Exact = Annotated[Positive, EXACT]
 
@@ -18,12 +18,15 @@ class AxisTracking:
         stiffness: K_a [1/s^2].
         damping: zeta_a [1/s].
         rate: Of every axis (theta, q...) a rate that it never exceeds, nominal rate and departure together,
-            with which an error of the age of measurements counts; empty where no clock is wrong [rad/s or
-            m/s].
+            with which an error of the age of measurements and viscous friction count; empty where no clock is
+            wrong and no friction is viscous [rad/s or m/s].
         acceleration: The same of its acceleration [rad/s^2 or m/s^2].
+        disturbance: Of the object's origin, then of every axis, the largest acceleration that friction of
+            joints causes; empty where there is none [m/s^2, rad/s^2 or m/s^2].
     """
 
     stiffness: _Exact
     damping: _Exact
     rate: tuple[_Exact, ...] = ()
     acceleration: tuple[_Exact, ...] = ()
+    disturbance: tuple[Annotated[NotNegative, EXACT], ...] = ()

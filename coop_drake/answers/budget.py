@@ -24,7 +24,8 @@ _Exact = Annotated[NotNegative, EXACT]
 
 SCALED = (
     "delay", "lag", "angle_noise", "rate_noise", "position_noise", "velocity_noise", "model_error",
-    "acceleration_error", "axis_error", "report_age", "clock_error", "grasp_noise", "turn_noise",
+    "acceleration_error", "axis_error", "joint_coulomb", "joint_viscous", "report_age", "clock_error",
+    "grasp_noise", "turn_noise",
 )  # fmt: skip
 """Departures that a budget of the same control rate has more or less of."""
 
@@ -52,9 +53,12 @@ class Budget:
         single_noise: Largest of these errors of one robot over the mean's [-].
         model_error: Largest error of an acceleration over its command, as a wrong mass causes [-].
         acceleration_error: Largest error of the acceleration of the object's origin besides: what robots that
-            disagree and friction leave [m/s^2].
+            disagree and the floor's friction leave [m/s^2].
         axis_error: Largest such error of the acceleration of an axis, where the coupling of axes counts, too;
             null for the number of ``acceleration_error`` [rad/s^2 or m/s^2].
+        joint_coulomb: Largest Coulomb friction of a joint, of any sign at any time [N m or N].
+        joint_viscous: Largest friction of a joint for each unit of its rate, beside ``dampings`` [N m s or N
+            s/m].
         report_age: How long a report of readiness may be used after it was made [s].
         clock_error: Largest error of a robot's clock; what it accepts by it may be older or younger than
             ``delay`` by ``age_error`` [s].
@@ -86,6 +90,8 @@ class Budget:
     model_error: Annotated[float, Limits(at_least=0.0, below=1.0)] = 0.0
     acceleration_error: NotNegative = 0.0
     axis_error: NotNegative | None = None
+    joint_coulomb: NotNegative = 0.0
+    joint_viscous: NotNegative = 0.0
     report_age: NotNegative = 0.0
     clock_error: NotNegative = 0.0
     base_force: Positive | None = None
@@ -116,6 +122,13 @@ class Budget:
                     "null without axes, bodies and the base of every robot: no effort is bounded without"
                 )
                 raise DataError(name, limit, allowed)
+
+        for name in ("joint_coulomb", "joint_viscous"):
+            if getattr(self, name) and not (self.axes and self.bodies):
+                allowed = (
+                    "0 without axes and bodies: what friction accelerates follows from the team's masses"
+                )
+                raise DataError(name, getattr(self, name), allowed)
 
     @property
     def robots(self) -> int:
@@ -150,6 +163,11 @@ class Budget:
         A robot accepts ages that seem to be wrong by the error of its clock; this one may hide as much again.
         """
         return 2.0 * self.clock_error
+
+    @property
+    def rubs(self) -> bool:
+        """Whether joints have friction."""
+        return self.joint_coulomb > 0.0 or self.joint_viscous > 0.0
 
     @property
     def axis_acceleration_error(self) -> float:

@@ -127,6 +127,8 @@ def _of_deployment(scenario: Scenario, tree: ComponentTree, masses: TeamMasses, 
         model_error=abs(deployment.mass_error),
         acceleration_error=ACCELERATION_ERROR,
         axis_error=max(ACCELERATION_ERROR, DISAGREEMENT * masses.disagreement),
+        joint_coulomb=deployment.joint_friction.coulomb,
+        joint_viscous=deployment.joint_friction.viscous,
         report_age=messages.delay + lost,
         clock_error=deployment.clock_error,
         base_force=deployment.actuators.base_force,
@@ -161,7 +163,6 @@ def _refuse_uncounted(scenario: Scenario, *, axes: bool) -> None:
             name: own for name, own in deployment.robots.items() if own.counted != RobotDepartures()
         },
         "deployment.floor": None if deployment.floor == Floor() else deployment.floor,
-        "deployment.joint_friction": own if (own := deployment.joint_friction) != JointFriction() else None,
         "deployment.pushes": deployment.pushes,
     }
     for key, value in uncounted.items():
@@ -170,6 +171,11 @@ def _refuse_uncounted(scenario: Scenario, *, axes: bool) -> None:
                 "nothing where a budget is asked for: none counts this; state a budget in a file instead"
             )
             raise ScenarioError(str(scenario.path), key, value, allowed)
+    if deployment.joint_friction != JointFriction() and not axes:
+        allowed = "none with the budget position, which bounds no rate of a joint; or budget: all"
+        raise ScenarioError(
+            str(scenario.path), "deployment.joint_friction", deployment.joint_friction, allowed
+        )
     stated = {key: value for key, value in limits.items() if value is not None}
     for key, value in stated.items():
         if not axes:

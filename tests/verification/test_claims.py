@@ -44,6 +44,9 @@ EFFORTS = {"base_torque": 500.0, "joint_effort": 500.0}
 CLOCKS = "warehouse"
 """The scenario whose clocks are wrong."""
 
+RUBBING, FRICTION = "base", {"coulomb": 0.1, "viscous": 0.05}
+"""The scenario whose joints have friction, and how much [N m, N m s]."""
+
 CELLS = 2
 """So many cells of every plan are verified: the first and the last one are special."""
 
@@ -107,6 +110,7 @@ FREE = {
     "transitions[].tolerance.effort[]": Free(SAFE + ", and at most its limit", (0.1, 1e9)),
     "axis_tracking.stiffness": Free(HELD, (0.5, 3.0)),
     "axis_tracking.damping": Free(HELD, (0.5, 3.0)),
+    "axis_tracking.disturbance[]": Free(SAFE + ", and such that what follows from it holds", (0.9, 100.0)),
     "tube.tracking_stiffness": Free(HELD, (0.5, 3.0)),
     "tube.tracking_damping": Free(HELD, (0.5, 3.0)),
     "tube.speed": Free("at most the speed with which the tube holds", (1.1,)),
@@ -145,6 +149,7 @@ def case(name, required):
     if required:
         departures = {"preset": "mobile_base", "budget": "all", "actuators": EFFORTS}
         departures |= {"clock_error": 1e-4} if name == CLOCKS else {}
+        departures |= {"joint_friction": FRICTION} if name == RUBBING else {}
         deployed = Deployment.completed(departures, "deployment")
         scenario = replace(scenario, deployment=convert_class(deployed, Deployment))
     problem, gains = planning_problem(scenario), scenario.gain_sets

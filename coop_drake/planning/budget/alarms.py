@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from coop_drake.answers.alarms import Alarms
@@ -12,8 +14,27 @@ from coop_drake.laws.departure import growth, unseen_time
 from coop_drake.tree.pose import FloatArray
 
 
+def rubbed(budget: Budget, tracking: AxisTracking | None) -> Budget:
+    """Return the budget of the object's origin: its ``acceleration_error`` counts the friction of joints."""
+    if tracking is None or not tracking.disturbance:
+        return budget
+    pushed = budget.acceleration_error + tracking.disturbance[0]
+    return replace(budget, acceleration_error=pushed, axis_error=budget.axis_acceleration_error)
+
+
+def axis_errors(budget: Budget, tracking: AxisTracking, axes: int) -> FloatArray:
+    """Return the largest accelerations of axes beside those of the model's error, shape (axes,)."""
+    errors = np.full(axes, budget.axis_acceleration_error)
+    return errors + tracking.disturbance[1:] if tracking.disturbance else errors
+
+
 def position_room(budget: Budget, tube: PositionTube) -> float:
-    """Return how far the object may be off its nominal position while no report tells of it [m]."""
+    """Return how far the object may be off its nominal position while no report tells of it [m].
+
+    Args:
+        budget: The budget, see ``rubbed``.
+        tube: The tube of the object's position.
+    """
     grown = growth(budget.velocity_noise, budget.acceleration_error, _unseen(budget))
     return _position_level(budget, tube) + budget.position_noise + budget.age_error * tube.velocity + grown
 
@@ -27,7 +48,8 @@ def mistaken(budget: Budget, tracking: AxisTracking, axes: int) -> FloatArray:
 
 def axis_reserve(budget: Budget, tracking: AxisTracking, axes: int) -> FloatArray:
     """Return what noise and growth need beside the level of every axis (theta, q...), shape (axes,)."""
-    grown = growth(budget.rate_noise, budget.axis_acceleration_error, _unseen(budget))
+    errors, time = axis_errors(budget, tracking, axes), _unseen(budget)
+    grown = np.array([growth(budget.rate_noise, error, time) for error in errors.tolist()])
     reserve: FloatArray = budget.angle_noise + grown + mistaken(budget, tracking, axes)[0]
     return reserve
 
@@ -53,7 +75,7 @@ def alarms_of(budget: Budget, tube: PositionTube, tracking: AxisTracking | None,
     """Return the levels that all transitions have in common.
 
     Args:
-        budget: The budget.
+        budget: The budget, see ``rubbed``.
         tube: The tube of the object's position.
         tracking: How axes are pulled to their nominal motions, None where the budget has no axes.
         axes: Number of axes (theta, q...).

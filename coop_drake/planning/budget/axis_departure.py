@@ -23,6 +23,7 @@ by s times its largest |x''|, which the plan states (``AxisTracking``).
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import inf
 
@@ -33,7 +34,7 @@ from coop_drake.answers.budget import Budget
 from coop_drake.compiled import compiled
 from coop_drake.laws.nominal_axes import lag_factors
 from coop_drake.laws.sampling import whole_periods
-from coop_drake.planning.budget.alarms import mistaken
+from coop_drake.planning.budget.alarms import axis_errors, mistaken
 from coop_drake.tree.pose import FloatArray
 
 MODEL_PARTS = 5
@@ -120,21 +121,26 @@ class AxisLoop:
 
         Errors of clocks are not counted, for they depend on how fast the axes are.
         """
-        pushes, error = self.sums[:, :, ACCELERATION], self.budget.axis_acceleration_error
+        pushes, axes = self.sums[:, :, ACCELERATION], max(len(self.tracking.disturbance) - 1, 1)
         noises = self.noises(1)[0]
-        steady = error + self.errors * TYPICAL_ACCELERATION
+        steady = axis_errors(self.budget, self.tracking, axes).mean() + self.errors * TYPICAL_ACCELERATION
         pull = (noises[:, Q] + steady * pushes[:, Q]) / (1.0 - self.rest * pushes[:, Q])
         found = noises[:, :Q] + (steady + self.rest * pull)[:, None] * pushes[:, :Q]
         away, fast = found.max(axis=0).tolist()
         return away, fast
 
 
-def best_loop(budget: Budget) -> AxisLoop | None:
-    """Return the loop with the gains for which a typical axis departs least; None where none is stable."""
+def best_loop(budget: Budget, disturbance: Sequence[float] = ()) -> AxisLoop | None:
+    """Return the loop with the gains for which a typical axis departs least; None where none is stable.
+
+    Args:
+        budget: The budget.
+        disturbance: As that of ``AxisTracking``.
+    """
     best, least = None, inf
     for stiffness in STIFFNESSES:
         for damping in DAMPINGS:
-            tracking = AxisTracking(stiffness, damping * stiffness**0.5)
+            tracking = AxisTracking(stiffness, damping * stiffness**0.5, disturbance=tuple(disturbance))
             loop = axis_loop(tracking, budget)
             if loop is None:
                 continue

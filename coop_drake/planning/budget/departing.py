@@ -3,12 +3,13 @@
 The departure e = x - x^ of an axis is the sum of its loop's responses to what enters it, see
 ``axis_departure.py``. In one period this is at most
 
-    d = |epsilon| (|a^| + c(w^)) + c(w^ + e'_1) - c(w^) + axis_error + (1 + epsilon - f) q,
+    d = |epsilon| (|a^| + c(w^)) + c(w^ + e'_1) - c(w^) + w + (1 + epsilon - f) q,
 
 with the nominal rates w^ of all axes, and c the largest acceleration that rates alone cause where nothing is
 commanded: robots command what balances it at the nominal rates, with masses that are wrong by epsilon. e'_1
-is what the first term and ``axis_error`` alone cause: what noise adds is small and of any sign. All
-of this is known from the periods before, so that one pass forward in time bounds the departures of all axes.
+is what the first term and w alone cause, w being ``axis_error`` and what the friction of joints causes: what
+noise adds is small and of any sign. All of this is known from the periods before, so that one pass forward in
+time bounds the departures of all axes.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ import numpy as np
 
 from coop_drake.compiled import compiled
 from coop_drake.laws.nominal_axes import lag_factors
+from coop_drake.planning.budget.alarms import axis_errors
 from coop_drake.planning.budget.axis_departure import LATE, AxisLoop
 from coop_drake.planning.budget.axis_sets import AxisSets
 from coop_drake.planning.budget.axis_tube import ACCELERATION, COLUMNS, V
@@ -67,14 +69,14 @@ class _Scales(NamedTuple):
     Attributes:
         period: T [s].
         model: Largest |epsilon| [-].
-        error: ``axis_error`` [rad/s^2 or m/s^2].
+        error: w of every axis, shape (axes,) [rad/s^2 or m/s^2].
         rest: Half the width of a part of the model's range [-].
         left: What the lag leaves of a difference after a period [-].
     """
 
     period: float
     model: float
-    error: float
+    error: FloatArray
     rest: float
     left: float
 
@@ -82,7 +84,7 @@ class _Scales(NamedTuple):
 def at_rest(loop: AxisLoop, axes: int) -> Inflow:
     """Return what entered before the start, where all axes rest."""
     parts, _, memory = loop.kicks.shape
-    error = np.full((2, parts, axes), loop.budget.axis_acceleration_error)
+    error = np.tile(axis_errors(loop.budget, loop.tracking, axes), (2, parts, 1))
     return Inflow(np.repeat(error[..., None], memory, axis=3), np.stack([error[0], 0.0 * error[0]]))
 
 
@@ -105,7 +107,8 @@ def departing(
     entered[..., :memory] = before.past
     found, state = np.empty((4, samples + 1, axes)), np.concatenate([before.state, before.state[1:]])
     left = lag_factors(budget.period, budget.lag)[0]
-    scales = _Scales(budget.period, budget.model_error, budget.axis_acceleration_error, loop.rest, left)
+    error = axis_errors(budget, loop.tracking, axes)
+    scales = _Scales(budget.period, budget.model_error, error, loop.rest, left)
     responses = loop.kicks, loop.sums[:, :, LATE].copy(), loop.noises(axes), loop.errors
     _carry(responses, leaving, scales, coupling, moving, entered, state, found)
     highest = np.maximum.accumulate(entered[..., ::-1], axis=3)[..., ::-1]
@@ -246,7 +249,7 @@ def _enter(
     for i in range(axes):
         terms[i] = _rate_terms(coupling[i], moving[1])
         for p in range(len(errors)):
-            own = errors[p] * (moving[0, i] + terms[i]) + scales.error
+            own = errors[p] * (moving[0, i] + terms[i]) + scales.error[i]
             first[i] = max(first[i], now[3, p, i] + T * own)
             entered[1, p, i] = own
     for i in range(axes):

@@ -16,7 +16,7 @@ from coop_drake.laws.axis_table import LEAVING_TIME, REST_RATE, REST_REACH, axis
 from coop_drake.laws.gains import IDEAL_AGE, RestCondition
 from coop_drake.planning.budget.alarms import axis_noises
 from coop_drake.planning.budget.axis_departure import SLACK, AxisLoop, best_loop
-from coop_drake.planning.budget.coupling import TeamCouplings, team_couplings
+from coop_drake.planning.budget.coupling import Couplings, TeamCouplings, friction_pushes, team_couplings
 from coop_drake.planning.budget.restarting import reached_at_restart, with_restart
 from coop_drake.planning.budget.transitions import (
     LimitedEfforts,
@@ -31,10 +31,10 @@ AGE_FACTORS = (1.0, 1.25, 1.6, 2.0, 2.3, 2.6, 3.0)
 """Gains are tried for so many times the age of what a nominal motion's commands rest on [-]: slow motions
 take smaller accelerations and rates, in which the error of the model has its share."""
 
-CLOCK_ROUNDS = 8
-"""Largest number of rates and accelerations that are tried where ages are wrong [-]."""
+ROUNDS = 8
+"""Largest number of rates that are tried where ages are wrong or friction is viscous [-]."""
 
-CLOCK_ROOM = 1.05
+ROOM = 1.05
 """Factor by which the next ones are larger than those that were reached [-]."""
 
 _UNSTABLE = UnprovedTransition(0, 0, "is not stable under the delay, the lag and the model's error")
@@ -65,7 +65,8 @@ def fit_budget(
         The plan with these gains, the budget and what follows from it, with the times estimated before; or
         where it does not hold.
     """
-    loop = best_loop(budget)
+    couplings, efforts = team or team_couplings(budget, problem.tree, plan.cells)
+    loop = best_loop(budget, friction_pushes(budget, couplings, 0.0).tolist() if budget.rubs else ())
     if loop is None:
         return _UNSTABLE
     factors = _factors(gain_set, budget)
@@ -78,20 +79,19 @@ def fit_budget(
             plans.append(with_gains(plans[0], gain_set.slowed(factors[len(plans)]), plan.gain_set))
         return axis_table(plans[choice].funnel(k), plans[choice].transitions[k].gains)
 
-    couplings, efforts = team or team_couplings(budget, problem.tree, plan.cells)
     limited = None if efforts is None else LimitedEfforts(efforts, acceleration)
-    for _ in range(CLOCK_ROUNDS if budget.clock_error else 1):
+    for _ in range(ROUNDS if budget.clock_error or budget.joint_viscous else 1):
         found = follow_transitions(
             table_of, len(factors), couplings.rates[:, 1:], plan.start[2:], loop, limited
         )
         if isinstance(found, UnprovedTransition):
             return found
-        faster = _faster(found, loop, couplings.rates[:, 1:])
+        faster = _faster(found, loop, couplings)
         if faster is None:
             break
         loop = replace(loop, tracking=faster)
     else:
-        return UnprovedTransition(0, None, "an axis may be too fast for the error of the clocks")
+        return UnprovedTransition(0, None, "an axis may be too fast for wrong clocks or viscous friction")
     fitted = tuple(
         _stated(plans[passed.choice].transitions[k], passed, factors[passed.choice], loop)
         for k, passed in enumerate(found)
@@ -100,21 +100,25 @@ def fit_budget(
     return with_restart(fitted_plan, loop, couplings.rates[:, 1:], limited)
 
 
-def _faster(found: Sequence[ProvedTransition], loop: AxisLoop, couplings: FloatArray) -> AxisTracking | None:
-    """Return larger rates and accelerations of axes that wrong ages shall count with; None if these are none.
+def _faster(found: Sequence[ProvedTransition], loop: AxisLoop, couplings: Couplings) -> AxisTracking | None:
+    """Return larger rates and accelerations of axes that wrong ages and viscous friction shall count with.
 
-    Departures grow with them, and they with departures. Those of beginning a cell anew are among them.
+    None if they are not larger. Departures grow with them, and they with departures. Those of beginning a
+    cell anew are among them.
     """
-    if not loop.budget.clock_error:
+    budget = loop.budget
+    if not (budget.clock_error or budget.joint_viscous):
         return None
     reached, known = np.max([one.reached for one in found], axis=0), np.zeros((2, len(found[0].sets)))
-    reached = np.maximum(reached, reached_at_restart(loop, couplings))
+    reached = np.maximum(reached, reached_at_restart(loop, couplings.rates[:, 1:]))
     if loop.tracking.rate:
         known[:] = loop.tracking.rate, loop.tracking.acceleration
     if (reached <= known).all():
         return None
-    rate, acceleration = np.maximum(CLOCK_ROOM * reached, known).tolist()
-    return replace(loop.tracking, rate=tuple(rate), acceleration=tuple(acceleration))
+    rate, acceleration = np.maximum(ROOM * reached, known)
+    pushes = friction_pushes(budget, couplings, rate).tolist() if budget.rubs else ()
+    numbers = tuple(rate.tolist()), tuple(acceleration.tolist()), tuple(pushes)
+    return replace(loop.tracking, rate=numbers[0], acceleration=numbers[1], disturbance=numbers[2])
 
 
 def _factors(gain_set: ScheduledGains, budget: Budget) -> list[float]:

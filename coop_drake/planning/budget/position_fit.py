@@ -27,7 +27,7 @@ from coop_drake.geometry.parts import component_at, parts_of
 from coop_drake.geometry.passage import pole
 from coop_drake.geometry.tidy import tidy_cell
 from coop_drake.laws import ScheduledGains
-from coop_drake.planning.budget.alarms import alarms_of, position_room
+from coop_drake.planning.budget.alarms import alarms_of, position_room, rubbed
 from coop_drake.planning.budget.position_tube import PositionGains, position_tubes
 from coop_drake.planning.duration import plan_time, timed
 from coop_drake.planning.transitions import find_route
@@ -100,13 +100,15 @@ def fit_position(
         most: Largest acceleration that robots may command for the object's origin [m/s^2].
 
     Returns:
-        The plan with the tube and these regions; or what cannot be shown.
+        The plan with the budget, the tube and these regions; or what cannot be shown.
     """
     stiffest = max(transition.gains.stiffness for transition in plan.transitions)
-    tried = []
+    own, tried = rubbed(budget, plan.axis_tracking), list[Plan | UnprovedPosition]()
+    plan = replace(plan, budget=budget)
     for share in SOFTER:
-        tried.append(_fastest(problem, plan, gain_set, budget, share * stiffest, most))
-        if isinstance(tried[-1], Plan) and tried[-1].tube is not None and tried[-1].tube.speed >= QUICK:
+        tried.append(_fastest(problem, plan, gain_set, own, share * stiffest, most))
+        last = tried[-1]
+        if isinstance(last, Plan) and last.tube is not None and last.tube.speed >= QUICK:
             break
     plans = [found for found in tried if isinstance(found, Plan)]
     return min(plans, key=plan_time) if plans else tried[0]
@@ -169,7 +171,7 @@ def _fastest(
         if isinstance(found, UnprovedPosition):
             continue
         alarms = alarms_of(budget, tube, plan.axis_tracking, plan.start.size - 2)
-        found = timed(replace(found, budget=budget, alarms=alarms))
+        found = timed(replace(found, alarms=alarms))
         if best is not None and plan_time(best) <= plan_time(found):
             break
         best = found

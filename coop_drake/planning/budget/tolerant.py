@@ -8,12 +8,14 @@ from itertools import chain
 
 from shapely.errors import ShapelyError
 
+from coop_drake.answers.axis_tracking import AxisTracking
 from coop_drake.answers.budget import Budget
 from coop_drake.answers.plan import Plan
 from coop_drake.answers.problem import PlanningProblem
 from coop_drake.errors import GeometryError, PlanError, StallError
 from coop_drake.laws import ScheduledGains
-from coop_drake.planning.budget.coupling import TeamCouplings, team_couplings
+from coop_drake.planning.budget.alarms import rubbed
+from coop_drake.planning.budget.coupling import QUICKEST, TeamCouplings, friction_pushes, team_couplings
 from coop_drake.planning.budget.fitting import fit_budget
 from coop_drake.planning.budget.position_fit import (
     UnprovedPosition,
@@ -178,7 +180,7 @@ def _fitted(
 ) -> Plan | UnprovedTransition | UnprovedPosition:
     """Return what ``_held`` does; a plan states nothing about rests from which its position is not held."""
     found = _held(problem, plan, gain_set, budget, team)
-    if isinstance(found, Plan) and not position_may_rest(found, budget):
+    if isinstance(found, Plan) and not position_may_rest(found, rubbed(budget, found.axis_tracking)):
         return replace(found, restart=None)
     return found
 
@@ -187,7 +189,8 @@ def _held(
     problem: PlanningProblem, plan: Plan, gain_set: ScheduledGains, budget: Budget, team: TeamCouplings
 ) -> Plan | UnprovedTransition | UnprovedPosition:
     """Return a plan with gains, sets and regions under which its budget holds; or where it does not."""
-    unproved = unproved_position(problem, plan, gain_set, budget)  # first, for it takes far less time
+    resting = _rubbed(budget, team, 0.0)
+    unproved = unproved_position(problem, plan, gain_set, resting)  # first, for it takes far less time
     if unproved is not None:
         return unproved
     if not budget.axes:
@@ -210,7 +213,7 @@ def _within_limits(
     """
     best: Plan | None = None
     failed: UnprovedTransition | UnprovedPosition | None = None
-    for acceleration in commanded_accelerations(problem, plan, gain_set, budget):
+    for acceleration in commanded_accelerations(problem, plan, gain_set, _rubbed(budget, team, QUICKEST)):
         found: Plan | UnprovedTransition | UnprovedPosition
         found = fit_budget(problem, plan, gain_set, budget, acceleration, team)
         if isinstance(found, Plan):
@@ -225,6 +228,14 @@ def _within_limits(
         return best
     assert failed is not None  # some acceleration is allowed, see unproved_position
     return failed
+
+
+def _rubbed(budget: Budget, team: TeamCouplings, rate: float) -> Budget:
+    """Return the budget of the object's origin with the friction of joints that have this rate."""
+    if not budget.rubs:
+        return budget
+    pushes = friction_pushes(budget, team.couplings, rate)
+    return rubbed(budget, AxisTracking(1.0, 1.0, disturbance=tuple(pushes.tolist())))
 
 
 def _sentence(plan: Plan, unproved: UnprovedTransition | UnprovedPosition) -> str:

@@ -89,9 +89,11 @@ def check_axis_alarms(
             _check(float(level), float(least), f"{where}.{name}[{axis}]")
     if alarms.axis_reserve.shape != (axes,):
         raise RefusalError("alarms.axis_reserve", f"has {alarms.axis_reserve.size} numbers, not {axes}")
-    needed = budget.angle_noise + _grows(budget, budget.rate_noise, budget.axis_acceleration_error)
+    rubbing = tracking.disturbance[1:] or (0.0,) * axes
     for axis, reserve in enumerate(alarms.axis_reserve):
-        _check(float(reserve), float(needed + late[0, axis]), f"alarms.axis_reserve[{axis}]")
+        pushed = budget.axis_acceleration_error + rubbing[axis]
+        needed = budget.angle_noise + _grows(budget, budget.rate_noise, pushed) + late[0, axis]
+        _check(float(reserve), float(needed), f"alarms.axis_reserve[{axis}]")
         room = float(stated.distance[axis] - wrong[0, axis])
         if not room >= reserve - ROUNDING:
             finding = f"leaves {room:.6g} beside a robot's noise; its monitor needs {reserve:.6g}"

@@ -45,6 +45,7 @@ class Loop(NamedTuple):
             first, shape (p, memory, 3).
         old: Sums of those that are older, shape (p, 3).
         noise: What noise causes of e, e' and the pull, of every axis or of all, shape (p, axes or 1, 3).
+        pushes: Largest |w| of every axis, or of all, shape (axes or 1,) [rad/s^2 or m/s^2].
         errors: Largest |epsilon| of every part, shape (p, 1).
         spread: Largest |d| [-].
         started: Largest |e|, |e'| and |q| at all times after a unit of e' at the beginning, and in all
@@ -55,6 +56,7 @@ class Loop(NamedTuple):
     recent: FloatArray
     old: FloatArray
     noise: FloatArray
+    pushes: FloatArray
     errors: FloatArray
     spread: float
     started: FloatArray
@@ -114,6 +116,7 @@ def loop_of(tracking: AxisTracking, budget: Budget) -> Loop:
         recent,
         kicks[:, memory:].sum(axis=1),
         noise,
+        budget.axis_acceleration_error + np.array(tracking.disturbance[1:] or (0.0,)),
         np.abs(errors)[:, None] + spread,
         spread,
         (started + tracking.damping * delay * largest).T,
@@ -133,7 +136,8 @@ def mistaken(tracking: AxisTracking, budget: Budget) -> FloatArray:
 def resting(loop: Loop, axes: int) -> Entered:
     """Return what entered the loops of axes that rest at the plan's start."""
     parts, memory, _ = loop.recent.shape
-    error = np.full((2, parts, axes, memory), loop.budget.axis_acceleration_error)
+    error = np.empty((2, parts, axes, memory))
+    error[:] = loop.pushes[:, None]
     return Entered(error, error[0, :, :, 0], 0.0 * error[0, :, :, 0])
 
 
@@ -201,7 +205,7 @@ def _period(
     """Return |e|, |e'|, |e''| and |q| in one period, (4, axes), and what enters in it, (2, p, axes)."""
     T, (fastest, rates) = loop.budget.period, moving
     terms = _terms(coupling, rates)
-    own = loop.errors * (fastest + terms) + loop.budget.axis_acceleration_error
+    own = loop.errors * (fastest + terms) + loop.pushes
     more = _terms(coupling, rates + (state[3] + T * own).max(axis=0)) - terms
     push = (1.0 + loop.budget.model_error) * state[2] + own + more
     found = np.stack([state[0] + T * T / 8.0 * push, state[1] + T * push, push, state[2]]).max(axis=1)

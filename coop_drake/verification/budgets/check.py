@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from coop_drake.answers.axis_tracking import AxisTracking
-from coop_drake.answers.budget import Tolerance
+from coop_drake.answers.budget import Budget, Tolerance
 from coop_drake.answers.plan import Plan, Transition
 from coop_drake.errors import RefusalError
 from coop_drake.tree import ComponentTree
@@ -22,7 +22,7 @@ from coop_drake.tree.pose import FloatArray, IntArray
 from coop_drake.verification.budgets.alarms import alarms_of, check_axis_alarms
 from coop_drake.verification.budgets.axis_departure import Loop, departures, loop_of, resting
 from coop_drake.verification.budgets.axis_law import Axes, axes_of
-from coop_drake.verification.budgets.couplings import couplings
+from coop_drake.verification.budgets.couplings import Coupled, couplings
 from coop_drake.verification.budgets.efforts import Asked, asked, check_stated_efforts
 from coop_drake.verification.budgets.entering import entering, first_rest
 from coop_drake.verification.budgets.rate_room import check_rate_room
@@ -56,7 +56,8 @@ def check_budget(plan: Plan, tree: ComponentTree | None = None) -> Check | None:
             if stated is not None:
                 raise RefusalError(where, "is stated, but the plan has no budget for the axes")
         return None if plan.budget is None else Check("angles and joints are not part of the budget", 0)
-    loop, terms, tracking = _loop(plan), _coupling(plan, tree), _tracking(plan)
+    loop, coupled, tracking = _loop(plan), _coupling(plan, tree), _tracking(plan)
+    _check_friction(tracking, plan.budget, coupled)
     entered = resting(loop, plan.start.size - 2)
     smallest, count, entry, every = np.inf, 0, _start(plan), list[Asked]()
     for k, transition in enumerate(plan.transitions):
@@ -69,7 +70,7 @@ def check_budget(plan: Plan, tree: ComponentTree | None = None) -> Check | None:
             )
         _check_entry(stated, entry, f"{where}.tolerance")
         motion, entry = _check_motion(plan, k, stated, f"{where}.tolerance")
-        away, entered = departures(loop, terms[k], motion.moving, entered, motion.leaving)
+        away, entered = departures(loop, coupled.rates[k, 1:], motion.moving, entered, motion.leaving)
         _check_departures(transition, motion, away, tracking, f"{where}.tolerance")
         check_axis_alarms(alarms_of(plan), stated, plan.budget, tracking, f"{where}.tolerance")
         every.append(asked(plan.budget, motion.moving, away[:, 3]))
@@ -92,20 +93,35 @@ def _tracking(plan: Plan) -> AxisTracking:
     tracking, budget = plan.axis_tracking, plan.budget
     if tracking is None:
         raise RefusalError("axis_tracking", "is missing, but the plan has a budget")
-    needed = plan.start.size - 2 if budget is not None and budget.clock_error else 0
-    for name in ("rate", "acceleration"):
-        if len(getattr(tracking, name)) != needed:
-            found = f"has {len(getattr(tracking, name))} numbers, not {needed}"
+    axes, timed = plan.start.size - 2, budget is not None and (budget.clock_error or budget.joint_viscous)
+    needed = {"rate": axes, "acceleration": axes} if timed else {"rate": 0, "acceleration": 0}
+    needed["disturbance"] = 1 + axes if budget is not None and budget.rubs else 0
+    for name, count in needed.items():
+        if len(getattr(tracking, name)) != count:
+            found = f"has {len(getattr(tracking, name))} numbers, not {count}"
             raise RefusalError(f"axis_tracking.{name}", found)
     return tracking
 
 
-def _coupling(plan: Plan, tree: ComponentTree | None) -> FloatArray:
-    """Return the coefficients of the rate terms in every cell, none where the budget has no bodies."""
+def _check_friction(tracking: AxisTracking, budget: Budget, coupled: Coupled) -> None:
+    """Check how much friction accelerates the object's origin and the axes, with any sign in every joint.
+
+    Viscous friction counts with the rates that axes never exceed, which is checked for every transition.
+    """
+    if not budget.rubs:
+        return
+    friction = budget.joint_coulomb + budget.joint_viscous * np.array(tracking.rate[1:] or 0.0)
+    found = (coupled.efforts * friction).sum(axis=2).max(axis=0)
+    _require(np.array(tracking.disturbance), found, False, "axis_tracking.disturbance")
+
+
+def _coupling(plan: Plan, tree: ComponentTree | None) -> Coupled:
+    """Return what the masses couple in every cell, nothing where the budget has no bodies."""
     assert plan.budget is not None  # checked by the caller
     axes = plan.start.size - 2
     if not plan.budget.bodies:
-        return np.zeros((len(plan.cells), axes, axes, axes))
+        rows = len(plan.cells), 1 + axes
+        return Coupled(np.zeros((*rows, axes, axes)), np.zeros((*rows, 0, 2)), np.zeros((*rows, axes - 1)))
     if tree is None:
         raise ValueError("tree: expected the team, because the plan's budget has its bodies")
     if max(body[0] for body in plan.budget.bodies) >= len(tree.components):
@@ -116,7 +132,7 @@ def _coupling(plan: Plan, tree: ComponentTree | None) -> FloatArray:
         raise RefusalError("budget.dampings", f"has {len(plan.budget.dampings)} numbers, not {axes - 1}")
     if max((base[0] for base in plan.budget.bases), default=0) >= len(tree.components):
         raise RefusalError("budget.bases", f"expected components below {len(tree.components)}")
-    return couplings(plan.budget, tree, plan.cells).rates[:, 1:]
+    return couplings(plan.budget, tree, plan.cells)
 
 
 class _Motion(NamedTuple):

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import shapely
 from shapely import LineString, Point, Polygon
 
+from coop_drake.answers.axis_tracking import AxisTracking
 from coop_drake.answers.budget import Budget
 from coop_drake.answers.plan import Plan
 from coop_drake.answers.position_tube import PositionTube
@@ -37,8 +40,9 @@ def check_position(plan: Plan, position_tolerance: float) -> list[Check]:
         return []
     if plan.tube is None:
         raise RefusalError("tube", "is missing, but the plan has a budget")
-    _check_tube(plan, plan.tube, plan.budget)
-    room = check_alarms(alarms_of(plan), plan.tube, plan.budget)
+    budget = of_origin(plan.budget, plan.axis_tracking)
+    _check_tube(plan, plan.tube, budget)
+    room = check_alarms(alarms_of(plan), plan.tube, budget)
     least = min(_check_region(plan, k, room) for k in range(len(plan.cells)))
     for k in range(len(plan.cells)):
         _check_path(plan, k)
@@ -52,6 +56,13 @@ def check_position(plan: Plan, position_tolerance: float) -> list[Check]:
         raise RefusalError("tube.rest", finding)
     checks.append(Check("the object comes to rest at the goal", 1, room - rest, "m to spare"))
     return checks
+
+
+def of_origin(budget: Budget, tracking: AxisTracking | None) -> Budget:
+    """Return the budget of the object's origin, with what the stated friction of joints adds to its error."""
+    if tracking is None or not tracking.disturbance:
+        return budget
+    return replace(budget, acceleration_error=budget.acceleration_error + tracking.disturbance[0])
 
 
 def _regions(plan: Plan) -> list[tuple[str, Polygon | None]]:

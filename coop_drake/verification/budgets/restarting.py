@@ -17,6 +17,7 @@ from coop_drake.tree.pose import FloatArray
 from coop_drake.verification.budgets.axis_departure import HORIZON, Loop, departures, loop_of, resting
 from coop_drake.verification.budgets.couplings import couplings
 from coop_drake.verification.budgets.efforts import Asked, asked, efforts_asked
+from coop_drake.verification.budgets.position import of_origin
 from coop_drake.verification.budgets.position_loop import may_rest
 from coop_drake.verification.checks import Check
 
@@ -43,7 +44,8 @@ def check_restart(plan: Plan, tree: ComponentTree) -> Check | None:
     if budget is None or not budget.axes or plan.axis_tracking is None:
         raise RefusalError("restart", "is stated, but the plan has no budget for the axes")
     gains = plan.transitions[0].gains
-    if plan.tube is None or not may_rest(plan.tube, gains.stiffness, gains.damping, budget, stated.rest_rate):
+    pushed = of_origin(budget, plan.axis_tracking)
+    if plan.tube is None or not may_rest(plan.tube, gains.stiffness, gains.damping, pushed, stated.rest_rate):
         raise RefusalError("restart.rest_rate", "the object's tube does not hold from rests with such a rate")
     tracking, terms = plan.axis_tracking, np.zeros((len(plan.cells), axes, axes, axes))
     loop = loop_of(tracking, budget)
