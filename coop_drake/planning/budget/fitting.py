@@ -66,7 +66,10 @@ def fit_budget(
         where it does not hold.
     """
     couplings, efforts = team or team_couplings(budget, problem.tree, plan.cells)
-    loop = best_loop(budget, friction_pushes(budget, couplings, 0.0).tolist() if budget.rubs else ())
+    pushes = friction_pushes(budget, couplings, 0.0) if budget.rubs else np.zeros(0)
+    if not np.isfinite(pushes).all():
+        return UnprovedTransition(0, None, "cells are too wide to bound what friction of joints accelerates")
+    loop = best_loop(budget, pushes.tolist())
     if loop is None:
         return _UNSTABLE
     factors = _factors(gain_set, budget)
