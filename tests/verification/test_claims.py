@@ -110,6 +110,8 @@ FREE = {
     "transitions[].tolerance.effort[]": Free(SAFE + ", and at most its limit", (0.1, 1e9)),
     "axis_tracking.stiffness": Free(HELD, (0.5, 3.0)),
     "axis_tracking.damping": Free(HELD, (0.5, 3.0)),
+    "axis_tracking.rate[]": Free("at least what the axis reaches; what follows from it holds", (0.5, 100.0)),
+    "axis_tracking.acceleration[]": Free("at least what the axis reaches", (0.5,)),
     "axis_tracking.disturbance[]": Free(SAFE + ", and such that what follows from it holds", (0.9, 100.0)),
     "tube.tracking_stiffness": Free(HELD, (0.5, 3.0)),
     "tube.tracking_damping": Free(HELD, (0.5, 3.0)),
