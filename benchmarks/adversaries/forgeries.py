@@ -53,7 +53,7 @@ def forged_proof(question: Document, seed: int) -> Document | None:
     slice_ends = {"lower": [-pi, *question["lower"]], "upper": [pi, *question["upper"]]}
     head = {"format": "coop_drake proof of infeasibility", "version": 4, "problem": ""}
     return head | {
-        "kind": "disc",
+        "kind": "slices",
         "component": 0,
         "point": centre,
         "slices": [{**slice_ends, "witnesses": [witness], "cells": cells}],

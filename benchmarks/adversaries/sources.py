@@ -36,7 +36,7 @@ JOINTS: dict[str, Ask] = {
     **{f"hinge {seed}": partial(bend_question, seed, "revolute") for seed in (0, 2, 3, 5)},
     **{f"slide {seed}": partial(bend_question, seed, "prismatic") for seed in (0, 1, 3, 4, 5)},
 }
-DISCS: dict[str, Ask] = {
+NARROW: dict[str, Ask] = {
     "narrow": partial(corridor_problem, 0.45),
     "three_narrow": partial(corridor_problem, 0.45, 1.5, 3),
     **{f"random {seed}": partial(random_question, seed) for seed in (5, 6, 12, 17, 25, 63, 92, 98)},
@@ -59,7 +59,7 @@ SOURCES: dict[str, tuple[Ask, int]] = {
         ("plan", PLANS),
         ("slices", SLICES),
         ("slices_with_joints", JOINTS),
-        ("disc", DISCS),
+        ("narrow", NARROW),
         ("blocked_goal", BLOCKED),
     )
     for name, ask in asks.items()

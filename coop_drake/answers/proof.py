@@ -104,14 +104,14 @@ class InfeasibilityProof:
     both not; the start lies in reached ones only, and nothing of the goal, within its tolerances, in them.
 
     Attributes:
-        kind: How it was found: ``slices`` of the team or of a part of it, a ``disc`` inside one piece, or a
-            ``blocked goal``. The checker does not read it.
+        kind: How it was found: ``slices`` of the team or of a part of it, or a ``blocked goal``. The checker
+            does not read it.
         component: Index of the component that the positions and angles are those of.
         point: The point in the component's frame, shape (2,) [m].
         slices: The cover.
     """
 
-    kind: Literal["slices", "disc", "blocked goal"]
+    kind: Literal["slices", "blocked goal"]
     component: Index
     point: Vector
     slices: tuple[OverSlice, ...]

@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from functools import partial, reduce
 from itertools import combinations, product
-from math import pi
-from typing import TypeVar
 
 import numpy as np
 import shapely
 from manifold3d import CrossSection
 from shapely import Point, Polygon
 from shapely.errors import ShapelyError
-from shapely.geometry.base import BaseGeometry
 
 from coop_drake.answers.problem import PlanningProblem, goal_box
 from coop_drake.answers.proof import Cut, InfeasibilityProof, OverCell, OverSlice, Squeeze, Witness
@@ -173,8 +170,6 @@ def smaller(ring: FloatArray, loss: float) -> FloatArray | None:
 
 # Proofs of infeasibility, written down such that the verifier can check them.
 
-Found = TypeVar("Found")
-
 GROWTHS = (1e-3, 1e-4, 1e-5, 0.0, -5e-7)
 """Cells are grown by the first of these that keeps start and goal apart [m]: the more they are grown, the
 faster the check. The last one takes back half of the tolerance by which the planner grows cells, for cells
@@ -253,58 +248,13 @@ def slices_proof(
             for leaf in leaves
         ]
 
-    parts = _first(separated, [growth for growth in GROWTHS if growth <= most])
-    return None if parts is None else InfeasibilityProof("slices", 0, np.zeros(2), tuple(parts))
-
-
-def disc_proof(
-    tree: ComponentTree,
-    component: int,
-    centre: FloatArray,
-    ring: FloatArray,
-    piece: int,
-    regions: Sequence[Region],
-    start: FloatArray,
-    goals: BaseGeometry,
-) -> InfeasibilityProof | None:
-    """Write the regions between which a disc cannot pass down as a proof.
-
-    Args:
-        tree: The whole team.
-        component: The component that the disc lies in.
-        centre: Its centre in the component's frame, shape (2,) [m].
-        ring: Vertices of a polygon inside it, relative to its centre, shape (n, 2) [m].
-        piece: Number of the piece that it lies in.
-        regions: Over-approximation of the positions in W at which the disc fits.
-        start: Where the centre is at the start, shape (2,) [m].
-        goals: All places where the centre may be at the goal.
-
-    Returns:
-        The proof, or None if it fails because regions almost touch.
-    """
-
-    def separated(growth: float) -> OverSlice | None:
-        cells = _grown(regions, growth)
-        labels = [cell.dwithin(Point(start), TOUCHING) for cell in cells]
-        if any(label and cell.dwithin(goals, TOUCHING) for cell, label in zip(cells, labels, strict=True)):
-            return None
-        inside = Witness((piece,), component, ring)
-        ends = slice_ends(tree, (-pi, pi), {})
-        return OverSlice(*ends, (inside,), tuple(map(OverCell, labels, cells)))
-
-    found = _first(separated, GROWTHS)
-    return None if found is None else InfeasibilityProof("disc", component, centre, (found,))
-
-
-def _first(separated: Callable[[float], Found | None], growths: Sequence[float]) -> Found | None:
-    """What is found for the first growth of cells [m] that keeps start and goal apart, if any does."""
-    for growth in growths:
+    for growth in (growth for growth in GROWTHS if growth <= most):
         try:
-            found = separated(growth)
+            parts = separated(growth)
         except FAILURES:
             continue
-        if found is not None:
-            return found
+        if parts is not None:
+            return InfeasibilityProof("slices", 0, np.zeros(2), tuple(parts))
     return None
 
 

@@ -10,7 +10,7 @@ from math import pi
 import numpy as np
 import shapely
 from numpy.typing import NDArray
-from shapely import MultiPolygon, Point, Polygon
+from shapely import MultiPolygon, Polygon
 from shapely.geometry.base import BaseGeometry
 
 from coop_drake.answers.limits import TeamLimits
@@ -21,7 +21,7 @@ from coop_drake.geometry.convex import normals
 from coop_drake.geometry.minkowski import FreeSpace, to_polygon
 from coop_drake.geometry.parts import parts_of, polygon_rings
 from coop_drake.tree.circles import nearest_turn
-from coop_drake.tree.component_tree import Component, ComponentTree, ConvexShape, TreeJoint
+from coop_drake.tree.component_tree import Component, ComponentTree, TreeJoint
 from coop_drake.tree.pose import FloatArray
 
 # Checks of a question before the search: finite numbers of the right count, joints within their limits.
@@ -242,9 +242,6 @@ def _pieces(
 
 # Relaxations: the same question with fewer robots or a disc; if one is infeasible, the question is too.
 
-POLE_TOLERANCE = 1e-4
-"""Accuracy of the radius of an inscribed disc, unless another one is asked for [m]."""
-
 
 def relaxed(problem: PlanningProblem, robots: Collection[int]) -> tuple[PlanningProblem, tuple[int, ...]]:
     """The question with only some of the robots.
@@ -280,21 +277,6 @@ def _renumbered(component: Component, kept: list[int], joints: list[int]) -> Com
         return component
     joint = replace(component.joint, index=joints.index(component.joint.index))
     return replace(component, parent=kept.index(component.parent), joint=joint)
-
-
-def inscribed_disc(shape: ConvexShape, tolerance: float = POLE_TOLERANCE) -> ConvexShape:
-    """The largest disc inside a convex shape; of radius zero for a shape without interior.
-
-    Args:
-        shape: The shape.
-        tolerance: A larger disc may be larger by this much [m].
-    """
-    if len(shape.vertices) < 3:
-        return ConvexShape(shape.vertices.mean(axis=0, keepdims=True), shape.radius)
-    ring = Polygon(shape.vertices)
-    pole = shapely.maximum_inscribed_circle(ring, tolerance=tolerance)
-    centre = np.asarray(pole.coords[0])
-    return ConvexShape(centre[None, :], float(ring.exterior.distance(Point(centre))) + shape.radius)
 
 
 # The question of ending at one configuration of the goal.

@@ -14,7 +14,6 @@ pytestmark = pytest.mark.no_cover  # other tests run the same lines, and measuri
 ANSWERS = {
     "plan": room_with_pillar,
     "slices": lambda: bent_corridor(0.58),
-    "disc": lambda: bent_corridor(0.45),
     "blocked goal": lambda: bent_corridor(1.2, goal=(5.6, 5.0, 0.1)),
 }
 

@@ -39,7 +39,7 @@ VALUES = (
     -1,
 )
 ODD_FLOORS = {name: floor for name, floor in (OPEN_FLOORS | CLOSED_FLOORS).items() if not floor.is_empty}
-QUESTIONS = {"plan": room_with_pillar, "disc": lambda: bent_corridor(0.45)}
+QUESTIONS = {"plan": room_with_pillar, "slices": lambda: bent_corridor(0.45)}
 
 
 @cache
@@ -114,7 +114,7 @@ def test_joints_at_limits_far_from_the_origin_are_checked(
 def test_proofs_of_small_and_large_teams_hold(scale: float) -> None:
     found = answered(Similarity(scale=scale).question(bent_corridor(0.45)))
     assert found is not None
-    assert found[1]["kind"] == "disc"
+    assert found[1]["kind"] == "slices"
     assert refusal(*found) == ""
 
 

@@ -31,9 +31,8 @@ from tests.support.certificates import (
 from tests.support.free_positions import FreePositions
 
 PROBLEM = bent_corridor(0.58)
-BY_DISC = bent_corridor(0.45)
 AT_GOAL = bent_corridor(1.2, goal=(5.6, 5.0, 0.1))
-KINDS = {"slices": PROBLEM, "disc": BY_DISC, "blocked goal": AT_GOAL}
+KINDS = {"slices": PROBLEM, "blocked goal": AT_GOAL}
 
 
 def proof_of(problem):
@@ -155,8 +154,6 @@ def test_a_proof_about_one_floor_does_not_hold_on_a_wider_one(documents, tmp_pat
     assert "problem: " in refusal(documents["slices"], tmp_path, wider)
     forged = {**documents["slices"], "problem": problem_digest(wider)}
     assert "no cell covers" in refusal(forged, tmp_path, wider)
-    forged = {**documents["disc"], "problem": problem_digest(wider)}
-    assert "no cell covers" in refusal(forged, tmp_path, wider)
 
 
 def test_a_cut_through_free_space_is_refused():
@@ -200,11 +197,9 @@ def without_label(part, problem):
             r"format: 'song' is not allowed; expected 'coop_drake plan'",
         ),
         ("slices", ("slices", 0, "lower", 0), 9.0, r"slices\[0\].upper\[0\]: .* 9.0 or more"),
-        ("disc", ("component",), 7, r"index: 7 is none below 2"),
-        ("disc", ("component",), 1, r"may leave the inside of"),
-        ("disc", ("point", 1), 0.01, r"witnesses: may leave the inside of"),
+        ("slices", ("point", 1), 0.01, r"witnesses: may leave the inside of"),
         (
-            "disc",
+            "slices",
             ("slices", 0, "cells", 0, "reached"),
             None,
             r"reached: None is not allowed; expected true or false",

@@ -7,10 +7,10 @@ from dataclasses import replace
 
 import numpy as np
 import shapely
-from shapely import MultiPolygon
+from shapely import MultiPolygon, Point, Polygon
 
 from coop_drake.answers.problem import PlanningProblem
-from coop_drake.planning.questions import inscribed_disc, relaxed
+from coop_drake.planning.questions import relaxed
 from coop_drake.planning.sampling.collision import (
     ObstacleGrid,
     bodies_apart,
@@ -101,6 +101,21 @@ def disc_question(question: PlanningProblem) -> PlanningProblem:
     body = Body("disc", None, (max(discs, key=lambda disc: disc.radius),))
     tree = ComponentTree((Component("disc", None, None, (body,)),), frozenset())
     return replace(question, tree=tree)
+
+
+def inscribed_disc(shape: ConvexShape, tolerance: float) -> ConvexShape:
+    """The largest disc inside a convex shape; of radius zero for a shape without interior.
+
+    Args:
+        shape: The shape.
+        tolerance: A larger disc may be larger by this much [m].
+    """
+    if len(shape.vertices) < 3:
+        return ConvexShape(shape.vertices.mean(axis=0, keepdims=True), shape.radius)
+    ring = Polygon(shape.vertices)
+    pole = shapely.maximum_inscribed_circle(ring, tolerance=tolerance)
+    centre = np.asarray(pole.coords[0])
+    return ConvexShape(centre[None, :], float(ring.exterior.distance(Point(centre))) + shape.radius)
 
 
 def _guiding_disc(shape: ConvexShape) -> ConvexShape:
