@@ -3,9 +3,8 @@ from .boundary import BoundaryDistance
 from .minkowski import FreeSpace
 from .passage import Passage, PassageFinder, pole
 from .simplify import sharpest_angle, simplify_inward
-from .slits import cut_holes
 from .swept_tree import SweptTree
-from .tidy import tidy_cell
+from .tidy import cut_holes, tidy_cell
 
 __all__ = [
     "BodyPairs",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from heapq import heappop, heappush
 from itertools import combinations
 
 import numpy as np
@@ -11,12 +12,209 @@ import shapely
 from numpy.typing import ArrayLike
 from shapely import LineString, Polygon
 
+from coop_drake.compiled import compiled
 from coop_drake.errors import GeometryError
-from coop_drake.geometry.boundary import BoundaryDistance
-from coop_drake.geometry.edge_pieces import IndexArray
-from coop_drake.geometry.medial import Graph, medial_graph, widest_path
+from coop_drake.geometry.boundary import BoundaryDistance, edges_of
+from coop_drake.geometry.edge_pieces import IndexArray, cut_edges
 from coop_drake.geometry.triangles import triangulate
-from coop_drake.tree.pose import FloatArray
+from coop_drake.tree.pose import FloatArray, IntArray
+
+# The medial graph of a polygon: the Voronoi graph of samples of its boundary, as far as it lies inside.
+
+SHORTEST_SAMPLE = 2e-3
+"""The boundary is sampled no finer than this [m]; narrower passages are still measured exactly."""
+
+SAMPLES_PER_CLEARANCE = 2.0
+"""Samples on a stretch of boundary as long as its distance to the opposite wall."""
+
+SAMPLES_PER_BOUNDARY = 64.0
+"""Samples on a boundary that has no opposite wall, such as a triangle's."""
+
+
+@dataclass(frozen=True)
+class Graph:
+    """An undirected graph in the plane.
+
+    Attributes:
+        nodes: Positions, shape (n, 2) [m].
+        pairs: Ends of the edges, shape (edges, 2).
+        clearance: Smallest distance of each edge to the boundary, shape (edges,) [m].
+        length: Length of each edge, shape (edges,) [m].
+    """
+
+    nodes: FloatArray
+    pairs: IndexArray
+    clearance: FloatArray
+    length: FloatArray
+
+
+def medial_graph(polygon: Polygon, distance: BoundaryDistance) -> tuple[Graph, FloatArray]:
+    """Build the medial graph of a region, with holes or without, given the distance to its boundary.
+
+    Returns:
+        The graph, and the clearance of each node, shape (n,) [m], not positive for nodes outside.
+    """
+    samples, successor = _samples_of(polygon)
+    nodes, pairs, walls = _voronoi(samples)
+    node_clearance = distance.batch(nodes)
+    # The Voronoi edge between two consecutive samples crosses the boundary.
+    through = (successor[walls[:, 0]] == walls[:, 1]) | (successor[walls[:, 1]] == walls[:, 0])
+    kept = ~through & (node_clearance[pairs] > 0.0).all(axis=1)
+    pairs, walls = pairs[kept], walls[kept]
+    first, second = nodes[pairs[:, 0]], nodes[pairs[:, 1]]
+    length = np.linalg.norm(second - first, axis=1)
+    # The edge is closest to its two walls where it passes between them.
+    middle = 0.5 * (samples[walls[:, 0]] + samples[walls[:, 1]])
+    along = ((middle - first) * (second - first)).sum(axis=1) / np.maximum(length**2, 1e-30)
+    gate = first + np.clip(along, 0.0, 1.0)[:, None] * (second - first)
+    clearance = np.minimum(node_clearance[pairs].min(axis=1), distance.batch(gate))
+    inside = clearance > 0.0
+    return Graph(nodes, pairs[inside], clearance[inside], length[inside]), node_clearance
+
+
+def widest_path(graph: Graph, start: int, end: int) -> IndexArray | None:
+    """Nodes of the path whose narrowest edge is widest, the shortest among equally wide, or None.
+
+    No edge of the graph occurs twice.
+    """
+    order = np.argsort(-graph.clearance, kind="stable")
+    pairs = np.ascontiguousarray(graph.pairs[order], dtype=np.int64)
+    count = _joining(pairs, graph.clearance[order], len(graph.nodes), start, end)
+    if count == 0:
+        return None
+    before = _shortest(pairs[:count], graph.length[order[:count]], len(graph.nodes), start, end)
+    chain = [end]
+    while chain[-1] != start:
+        chain.append(int(before[chain[-1]]))
+    return np.array(chain[::-1], dtype=np.intp)
+
+
+@compiled
+def _joining(pairs: IntArray, clearance: FloatArray, count: int, start: int, end: int) -> int:
+    """Number of edges, the widest first, that join two nodes, with all that are as wide as the last of them.
+
+    Args:
+        pairs: Ends of the edges, shape (edges, 2).
+        clearance: Their clearances, falling, shape (edges,) [m].
+        count: Number of nodes.
+        start: The one node.
+        end: The other node.
+
+    Returns:
+        The number, 0 if the edges do not join the nodes.
+    """
+    joined_to = np.arange(count)
+    for k in range(len(pairs)):
+        joined_to[_root(joined_to, pairs[k, 0])] = _root(joined_to, pairs[k, 1])
+        if _root(joined_to, start) == _root(joined_to, end):
+            last = k + 1
+            while last < len(pairs) and clearance[last] == clearance[k]:
+                last += 1
+            return last
+    return 0
+
+
+@compiled
+def _root(joined_to: IntArray, node: int) -> int:
+    """The node that stands for all that a node is joined to; paths to it become shorter."""
+    while joined_to[node] != node:
+        joined_to[node] = joined_to[joined_to[node]]
+        node = joined_to[node]
+    return node
+
+
+@compiled
+def _shortest(pairs: IntArray, length: FloatArray, count: int, start: int, end: int) -> IntArray:
+    """Dijkstra's algorithm on an undirected graph.
+
+    Args:
+        pairs: Ends of the edges, shape (edges, 2).
+        length: Their lengths, shape (edges,) [m].
+        count: Number of nodes.
+        start: Where paths begin.
+        end: Where the search stops; a path must exist.
+
+    Returns:
+        For each node that was reached the one before it, shape (nodes,).
+    """
+    first_of = np.zeros(count + 1, np.int64)
+    for k in range(len(pairs)):
+        first_of[pairs[k, 0] + 1] += 1
+        first_of[pairs[k, 1] + 1] += 1
+    for i in range(count):
+        first_of[i + 1] += first_of[i]
+    edges, filled = np.empty(2 * len(pairs), np.int64), first_of.copy()
+    for k in range(len(pairs)):
+        for side in range(2):
+            node = pairs[k, side]
+            edges[filled[node]] = k
+            filled[node] += 1
+    before, distance = np.full(count, -1), np.full(count, np.inf)
+    distance[start] = 0.0
+    waiting = [(0.0, start)]
+    while waiting:
+        reached, node = heappop(waiting)
+        if node == end:
+            break
+        if reached > distance[node]:
+            continue
+        for place in range(first_of[node], first_of[node + 1]):
+            k = edges[place]
+            other = pairs[k, 0] + pairs[k, 1] - node
+            longer = reached + length[k]
+            if longer < distance[other]:
+                distance[other] = longer
+                before[other] = node
+                heappush(waiting, (longer, other))
+    return before
+
+
+def _voronoi(samples: FloatArray) -> tuple[FloatArray, IndexArray, IndexArray]:
+    """Voronoi vertices (n, 2), which pairs of them edges join, and which samples stand beside each edge."""
+    # Centred, so that far-away samples lose no digits.
+    centre = samples.mean(axis=0)
+    points = samples - centre
+    triangles = shapely.delaunay_triangles(shapely.multipoints(points))
+    corners = shapely.get_coordinates(triangles).reshape(-1, 4, 2)[:, :3]
+    simplices = _indices(points, corners)
+    u, v = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    twice_area = 2.0 * (u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0])
+    flat = np.abs(twice_area) < 1e-14
+    twice_area[flat] = np.inf
+    uu, vv = (u * u).sum(axis=1), (v * v).sum(axis=1)
+    offset = (
+        np.stack([v[:, 1] * uu - u[:, 1] * vv, u[:, 0] * vv - v[:, 0] * uu], axis=1) / twice_area[:, None]
+    )
+    nodes = corners[:, 0] + offset + centre
+    # A side that two triangles share is dual to the Voronoi edge between their nodes.
+    sides = np.sort(simplices[:, [[1, 2], [2, 0], [0, 1]]].reshape(-1, 2), axis=1)
+    order = np.lexsort((sides[:, 1], sides[:, 0]))
+    shared = np.flatnonzero((sides[order[:-1]] == sides[order[1:]]).all(axis=1))
+    first, second = order[shared] // 3, order[shared + 1] // 3
+    kept = ~flat[first] & ~flat[second]
+    return nodes, np.stack([first[kept], second[kept]], axis=1), sides[order[shared]][kept]
+
+
+def _indices(points: FloatArray, corners: FloatArray) -> IndexArray:
+    """Which of some points, shape (n, 2), stand at the corners of triangles, shape (m, 3, 2)."""
+    keys, wanted = points[:, 0] + 1j * points[:, 1], corners[..., 0] + 1j * corners[..., 1]
+    order = np.argsort(keys, kind="stable")
+    found: IndexArray = order[np.searchsorted(keys[order], wanted)]
+    return found
+
+
+def _samples_of(polygon: Polygon) -> tuple[FloatArray, IndexArray]:
+    """Samples of every ring, shape (n, 2), and for each the index of the next one on its ring, shape (n,)."""
+    sizes = [len(ring.coords) - 1 for ring in (polygon.exterior, *polygon.interiors)]
+    coarsest = polygon.exterior.length / SAMPLES_PER_BOUNDARY
+    samples, owners = cut_edges(edges_of(polygon), SHORTEST_SAMPLE, coarsest, SAMPLES_PER_CLEARANCE)
+    rings = np.repeat(np.arange(len(sizes)), sizes)[owners]
+    successor = np.arange(1, len(samples) + 1)
+    for ring in range(len(sizes)):
+        members = np.flatnonzero(rings == ring)
+        successor[members[-1]] = members[0]
+    return samples, successor
+
 
 POLE = 1e-3
 """How much more clearance than the pole another point may have [m]; less where the polygon is thin."""

@@ -39,8 +39,8 @@ from coop_drake.planning.transitions import (
 )
 from coop_drake.progress import Progress
 from coop_drake.tree.circles import nearest_turn
+from coop_drake.tree.levers import usual_unit
 from coop_drake.tree.pose import FloatArray
-from coop_drake.tree.usual_unit import usual_unit
 
 # Covering a path again: other boxes along it, with which the transport takes less time.
 

@@ -47,8 +47,8 @@ from coop_drake.planning.questions import (
 from coop_drake.planning.rescaling import Rescaling
 from coop_drake.planning.sampled_search import BoxSequence, SampledSearch, Tried, ending_freely
 from coop_drake.progress import Progress
+from coop_drake.tree.levers import usual_unit
 from coop_drake.tree.pose import FloatArray
-from coop_drake.tree.usual_unit import usual_unit
 
 # Search by cells alone, without samples: with our order of splits, or as the paper prints it.
 

@@ -15,8 +15,8 @@ from coop_drake.answers.problem import PlanningProblem
 from coop_drake.errors import RefusalError
 from coop_drake.laws import GainSet, ScheduledGains
 from coop_drake.planning.duration import estimated
+from coop_drake.tree.levers import usual_unit
 from coop_drake.tree.pose import FloatArray
-from coop_drake.tree.usual_unit import usual_unit
 from coop_drake.verification.checks import Check
 
 SAME_VALUE = 1e-6

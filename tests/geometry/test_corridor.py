@@ -5,7 +5,7 @@ from hypothesis import given, settings
 from shapely import LineString, Point, box
 
 from coop_drake.geometry import BoundaryDistance, PassageFinder
-from coop_drake.geometry.corridor import corridor_around
+from coop_drake.geometry.tidy import corridor_around
 from tests.support.shapes import floors_with_ends
 
 

@@ -5,7 +5,7 @@ from hypothesis import given, settings
 from shapely import LineString, Point, box
 
 from coop_drake.geometry import BoundaryDistance, PassageFinder, cut_holes
-from coop_drake.geometry.slits import WIDTH
+from coop_drake.geometry.tidy import WIDTH
 from tests.support.shapes import floors_with_ends
 
 HALL = box(0, 0, 6, 4)

@@ -1,22 +1,33 @@
-"""Relaxations in turns: proofs where there are proofs, none of a feasible case, covers without a gap."""
+"""Proofs that no plan exists: of parts of a team, from the walls near an end, and of squeezed pairs."""
 
+from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
 import pytest
-from shapely import Point, Polygon, box
+import shapely
+from shapely import Point, Polygon, affinity, box, union_all
 
-from benchmarks.planner.family import corridor_problem
-from coop_drake.answers.problem import PlanningProblem
+from benchmarks.adversaries.questions import discs_in_a_corridor
+from benchmarks.planner.family import corridor_floor, corridor_problem, shelf_problem
+from coop_drake.answers import Infeasible, PlanningProblem
+from coop_drake.laws import ScheduledGains
+from coop_drake.planning import find_channel
 from coop_drake.planning.blocked_goal import blocked_goal
+from coop_drake.planning.cells.cells import Squeezes
 from coop_drake.planning.cells.exploration import Exploration, Verdict
-from coop_drake.planning.proofs import Proofs, clearance_bound
+from coop_drake.planning.planner import plan
+from coop_drake.planning.proofs import MANY_CORNERS, Proofs, clearance_bound, refuted_at_an_end
 from coop_drake.planning.questions import relaxed
 from coop_drake.planning.sampling.sampler import inscribed_disc
 from coop_drake.tree.component_tree import Body, Component, ComponentTree, ConvexShape, TreeJoint
 from coop_drake.tree.pose import PlanarPose
+from coop_drake.verification import verify_proof
 from tests.planning.test_search import rod_problem
 from tests.support.cases import case, rectangle, transport
+from tests.support.free_positions import FreePositions
+
+# Relaxations in turns: proofs where there are proofs, none of a feasible case, covers without a gap.
 
 
 def covered(problem: PlanningProblem, lower: np.ndarray, upper: np.ndarray) -> bool:
@@ -143,3 +154,96 @@ def test_a_goal_in_collision_is_stated() -> None:
 @pytest.mark.parametrize(("corridor", "bound"), [(0.21, 0.01), (0.3, 0.08), (1.0, None)])
 def test_the_room_of_a_way_is_bounded(corridor: float, bound: float | None) -> None:
     assert clearance_bound(rod_problem(corridor))[0] == bound
+
+
+# On large floors the walls near the goal or start prove that no plan exists; the exact checker agrees.
+
+
+def behind_a_corridor(width: float) -> PlanningProblem:
+    """Shelves, and the goal in a room behind a corridor of some width [m], with a bend."""
+    shelves = shelf_problem(MANY_CORNERS + 20)
+    *_, x, y = shelves.workspace.bounds
+    off = np.array([x - 6.0, y - 1.0, 0.0])
+    floor = union_all([shelves.workspace, affinity.translate(corridor_floor(width, 1.2), *off[:2])])
+    return replace(shelves, workspace=floor.simplify(0.0), goal_pose=corridor_problem().goal_pose + off)
+
+
+@pytest.mark.slow
+@pytest.mark.no_cover
+def test_a_bend_that_is_too_narrow_is_proved_from_the_walls_near_it() -> None:
+    question = behind_a_corridor(0.76)
+    result = plan(question, ScheduledGains(), gain_set_name="scheduled")
+    assert isinstance(result, Infeasible)
+    assert result.proof is not None
+    cells = [cell.polygon for part in result.proof.slices for cell in part.cells]
+    most = max(int(shapely.get_num_coordinates(cell)) for cell in cells)
+    assert most < MANY_CORNERS / 2  # shelves far away are not in the certificate
+    verify_proof(result.proof, question)  # raises an error where it refuses
+
+
+def test_a_start_that_cannot_be_left_is_proved_without_the_goal() -> None:
+    question = shelf_problem(MANY_CORNERS + 20)
+    x, y = question.start[:2]
+    fence = box(x - 3.0, y - 3.0, x + 2.6, y + 3.0).difference(box(x - 3.0, y - 3.0, x + 2.4, y + 2.8))
+    gap = box(x - 0.2, y, x + 0.2, y + 4.0)
+    fenced = replace(question, workspace=question.workspace.difference(fence.difference(gap)))
+    refutation, _ = refuted_at_an_end(fenced)
+    assert refutation is not None
+    verify_proof(refutation.proof, fenced)
+
+
+def test_nothing_is_proved_where_the_team_can_go_or_the_floor_is_small() -> None:
+    refutation, slices = refuted_at_an_end(shelf_problem(MANY_CORNERS + 20))
+    assert refutation is None
+    assert slices > 0
+    assert refuted_at_an_end(corridor_problem(0.7)) == (None, 0)
+
+
+# Two round pieces that walls squeeze together: positions so forbidden hold no free configuration.
+
+
+class Recorded(Squeezes):
+    """Keeps every squeezed pair that is found, with its slice."""
+
+    def __init__(self, *given):
+        super().__init__(*given)
+        self.found = []
+
+    def find(self, intervals, corners, growth):
+        pair = super().find(intervals, corners, growth)
+        self.found += [(intervals, pair)] if pair is not None else []
+        return pair
+
+
+def two_bases(width):
+    """Robots 0 and 2 in a corridor with a bend; the base of robot 2 stays on the side of robot 0."""
+    question, _ = relaxed(corridor_problem(width, 1.5, robots=3), (0, 2))
+    *others, last = question.tree.components
+    last = replace(last, joint=replace(last.joint, lower=0.5))
+    start = np.array([*question.start[:4], 1.0])
+    return replace(question, tree=ComponentTree((*others, last), question.tree.unchecked_pairs), start=start)
+
+
+@pytest.mark.slow
+def test_walls_that_squeeze_two_bases_together_close_a_corridor_with_few_slices(monkeypatch):
+    monkeypatch.setattr("coop_drake.planning.cells.cells.Squeezes", Recorded)
+    question = two_bases(0.99)
+    exploration = Exploration(question)
+    assert exploration.run(1000).verdict is Verdict.INFEASIBLE
+    found, random = exploration.maker._squeezes.found, np.random.default_rng(0)
+    assert len(found) > 10
+    for intervals, pair in found:
+        positions = random.dirichlet(np.full(len(pair.polygon), 0.5), 100) @ pair.polygon
+        for share in random.random((5, len(intervals))):
+            angles = [low + part * (high - low) for part, (low, high) in zip(share, intervals, strict=True)]
+            assert not FreePositions(question.tree, question.workspace, angles).free(positions).any()
+
+
+@pytest.mark.slow
+def test_a_proof_with_squeezed_pairs_is_written_down_and_holds():
+    problem = discs_in_a_corridor(1.195)
+    answer, _ = find_channel(problem)
+    assert answer.proved
+    assert sum(len(part.squeezes) for part in answer.proof.slices) > 0
+    checked = {check.name: check.count for check in verify_proof(answer.proof, problem).checks}
+    assert checked["pieces are squeezed in all of a slice"] > 0
