@@ -34,54 +34,6 @@ from coop_drake.tree.circles import nearest_turn
 if TYPE_CHECKING:
     from coop_drake.planning.budget.tolerant import BeyondBudget
 
-# Plans along further paths: while the effort that was asked for lasts, the quickest plan is kept.
-
-
-def quicker_plans(
-    found: Channel | CoveredPath,
-    first: object,
-    make: Callable[[CoveredPath], object],
-    effort: float,
-    progress: Progress | None,
-) -> Iterator[Plan]:
-    """Yield plans along other sampled paths, each of them quicker than all before it.
-
-    Args:
-        found: The path of the first plan; a channel that was found without a path has no further ones.
-        first: The first plan, or what there is instead of one.
-        make: Makes a plan along a path; what it returns that is no plan, or raises, is passed over.
-        effort: As in ``PlannerSettings``; the first plan has taken 1, and every other path takes at most 1.
-        progress: Called with the best estimate and the fraction of the effort that is spent. If it raises
-            PatienceError, no further path is tried.
-    """
-    if not isinstance(found, CoveredPath):
-        return
-    best = plan_time(first) if isinstance(first, Plan) else inf
-    for number in range(1, ceil(effort)):
-        if progress is not None:
-            so_far = f"; the transport takes {best:.1f} s so far" if best < inf else ""
-            try:
-                progress(f"trying another path{so_far}", number / effort)
-            except PatienceError:
-                return
-        made = _tried(found, make, number, min(1.0, effort - number))
-        if made is not None and plan_time(made) < best:
-            best = plan_time(made)
-            yield made
-
-
-def _tried(
-    found: CoveredPath, make: Callable[[CoveredPath], object], number: int, share: float
-) -> Plan | None:
-    """Return the plan along another path, None if there is none."""
-    try:
-        other = found.another(number, share)
-        made = None if other is None else make(other)
-    except (GeometryError, PlanError, StallError, ShapelyError):
-        return None
-    return made if isinstance(made, Plan) else None
-
-
 FINER_ATTEMPTS = 2
 """Number of further searches after a path that cannot be executed, each with half the margin."""
 
@@ -295,3 +247,51 @@ def _added(before: SearchReport, latest: SearchReport) -> SearchReport:
         slices=before.slices + latest.slices,
         first_plan_cpu_seconds=latest.first_plan_cpu_seconds if first is None else first,
     )
+
+
+# Plans along further paths: while the effort that was asked for lasts, the quickest plan is kept.
+
+
+def quicker_plans(
+    found: Channel | CoveredPath,
+    first: object,
+    make: Callable[[CoveredPath], object],
+    effort: float,
+    progress: Progress | None,
+) -> Iterator[Plan]:
+    """Yield plans along other sampled paths, each of them quicker than all before it.
+
+    Args:
+        found: The path of the first plan; a channel that was found without a path has no further ones.
+        first: The first plan, or what there is instead of one.
+        make: Makes a plan along a path; what it returns that is no plan, or raises, is passed over.
+        effort: As in ``PlannerSettings``; the first plan has taken 1, and every other path takes at most 1.
+        progress: Called with the best estimate and the fraction of the effort that is spent. If it raises
+            PatienceError, no further path is tried.
+    """
+    if not isinstance(found, CoveredPath):
+        return
+    best = plan_time(first) if isinstance(first, Plan) else inf
+    for number in range(1, ceil(effort)):
+        if progress is not None:
+            so_far = f"; the transport takes {best:.1f} s so far" if best < inf else ""
+            try:
+                progress(f"trying another path{so_far}", number / effort)
+            except PatienceError:
+                return
+        made = _tried(found, make, number, min(1.0, effort - number))
+        if made is not None and plan_time(made) < best:
+            best = plan_time(made)
+            yield made
+
+
+def _tried(
+    found: CoveredPath, make: Callable[[CoveredPath], object], number: int, share: float
+) -> Plan | None:
+    """Return the plan along another path, None if there is none."""
+    try:
+        other = found.another(number, share)
+        made = None if other is None else make(other)
+    except (GeometryError, PlanError, StallError, ShapelyError):
+        return None
+    return made if isinstance(made, Plan) else None

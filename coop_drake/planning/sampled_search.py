@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass, replace
-from functools import partial
 from itertools import product
 
 import numpy as np
@@ -68,27 +68,6 @@ class BoxSequence:
     margin: float
 
 
-@dataclass(frozen=True)
-class Tried:
-    """What comes of one attempt.
-
-    Attributes:
-        found: Boxes along its path, if they cover it.
-        path: The path, None if there is none, shape (m, 3 + n) [m, rad].
-        blocked: Whether no path was found even for the object alone; None if that is unknown.
-        failed: Whether geometry failed.
-        trials: Boxes tried.
-        short: How far walls have to be moved back for the path; zero or less if it fits the floor [m].
-    """
-
-    found: BoxSequence | None = None
-    path: FloatArray | None = None
-    blocked: bool | None = None
-    failed: bool = False
-    trials: int = 0
-    short: float = 0.0
-
-
 def samples_of_attempt(number: int) -> int:
     """Samples for every subsystem in an attempt, counted from 1: few at first, then many."""
     if number <= LIGHT_ATTEMPTS:
@@ -117,92 +96,6 @@ NARROW_SAMPLES = 16_000
 CENTRED_PATHS, CENTRED_SHORT = 3, 0.005
 """So many of these paths, those that fit the floor best, are moved to the middle of their passages; those
 that still need the walls this far back are left out [m]."""
-
-Covered = Callable[[FloatArray, bool], BoxSequence | None]
-"""Covers a path with boxes that are proved free, the smallest ones if its second argument says so."""
-
-
-class NarrowSearch:
-    """Samples paths on larger floors, repairs them until they fit the floor, and covers them with boxes.
-
-    Args:
-        problem: The question.
-        hierarchy: Its subsystems.
-        covered: Covers a path with boxes.
-    """
-
-    def __init__(self, problem: PlanningProblem, hierarchy: SubsystemHierarchy, covered: Covered) -> None:
-        self._problem, self._hierarchy, self._covered = problem, hierarchy, covered
-
-    def tries(
-        self, number: int, progress: Callable[[float], None] | None, *, object_first: bool
-    ) -> list[Callable[[], Tried]]:
-        """The attempts of one round as functions to call, with other random numbers in every round.
-
-        The first round adds robot after robot, later ones sample all robots at once: added one by one they
-        go where the object alone goes most easily.
-
-        Args:
-            number: The round, counted from 0.
-            progress: Called with the fraction of an attempt that is done.
-            object_first: Whether attempts of later rounds repair a path of the object alone first, and end
-                where it does not fit the floor. This is not done for parts of the team with robots: their
-                paths are repaired to other places than the team's, and ways were lost by it.
-        """
-        first = SEEDS_PER_GROWTH * max(0, number - 1)
-        seeds = range(first, first + SEEDS_PER_GROWTH)
-        ways = product(seeds, FLOOR_GROWTHS)
-        return [partial(self._repaired, number > 0, object_first, *way, progress) for way in ways]
-
-    def _repaired(
-        self,
-        direct: bool,
-        object_first: bool,
-        seed: int,
-        growth: float,
-        progress: Callable[[float], None] | None,
-    ) -> Tried:
-        """Sample a path on a larger floor, repair it, and cover it if it fits."""
-        floor = widened_floor(self._problem.workspace, growth)
-        sampler = Sampler(self._hierarchy, floor, BODY_GAP, seed, progress)
-        if not direct:
-            path = sampler.path(NARROW_SAMPLES)
-        elif object_first:
-            guide = self._repaired_object(sampler, growth)
-            if guide is None:
-                return Tried()
-            path = sampler.path_around(guide, NARROW_SAMPLES)
-        else:
-            path = sampler.direct_path(NARROW_SAMPLES)
-        if not len(path):
-            return Tried()
-        path, short = repaired(self._problem, path, growth)
-        found = None if short > 0.0 else self._covered(path, False)
-        return Tried(found, path, short=short)
-
-    def _repaired_object(self, sampler: Sampler, growth: float) -> GuidePath | None:
-        """Path of the object alone, repaired; None if there is none that almost fits the floor."""
-        guide = sampler.direct((), NARROW_SAMPLES)
-        if guide is None:
-            return None
-        path, short = repaired(self._hierarchy.subsystem(()).question, guide.path, growth)
-        return None if short > CENTRED_SHORT else GuidePath(path, guide.joints)
-
-    def through_middle(self, done: Sequence[Tried]) -> BoxSequence | None:
-        """Cover the path of one of some attempts, those that fit best first, in the middle of its passages.
-
-        The boxes are the smallest ones, so a transport through them takes long.
-        """
-        fitting = [
-            (one.short, one.path) for one in done if one.path is not None and one.short < CENTRED_SHORT
-        ]
-        for needed, path in sorted(fitting, key=lambda one: one[0])[:CENTRED_PATHS]:
-            moved, short = centred(self._problem, path, needed)
-            found = None if short > 0.0 else self._covered(moved, True)
-            if found is not None:
-                return found
-        return None
-
 
 CLEARANCES = (0.015, 0.01), (0.002, 0.002)
 """Clearances from the walls, and distances between bodies of the team, with which paths are sampled, in turns
@@ -234,7 +127,6 @@ class SampledSearch:
         self._pairs = BodyPairs(self._swept)
         self._scale = configuration_scale(problem.tree)
         self._hierarchy = SubsystemHierarchy(problem, route)
-        self._narrow = NarrowSearch(problem, self._hierarchy, self._closely)
         self._start_inside = problem.workspace.contains(exact_footprint(problem.tree, problem.start))
         self._attempts = 0
         self.slices = 0
@@ -245,7 +137,7 @@ class SampledSearch:
         number: int,
         progress: Callable[[float], None] | None = None,
         part: tuple[int, ...] | None = None,
-    ) -> Iterator[Tried]:
+    ) -> Iterator[BoxSequence | None]:
         """Sample some paths and cover each of them at margin zero, all with other samples.
 
         Args:
@@ -253,30 +145,16 @@ class SampledSearch:
             progress: Called with the fraction of an attempt that is done.
             part: Robots for which, with the object alone, a path seems hard to find: it is sampled first.
 
-        Returns:
-            What comes of the attempts, each made when it is asked for; ``taken`` counts it.
+        Yields:
+            The boxes along the path of each attempt, None if no path was found or covered.
         """
-        first = self._attempts + 1
-        works = [partial(self._attempt, k, progress, part=part) for k in range(first, first + number)]
-        return map(self._counted, works)
-
-    def taken(self, tried: Tried) -> BoxSequence | None:
-        """Count an attempt; returns its boxes, None if no path was found or covered."""
-        self._attempts += 1
-        self.slices += tried.trials
-        if tried.blocked is not None:
-            self.object_blocked = self.object_blocked + 1 if tried.blocked else 0
-        return tried.found
-
-    def _counted(self, work: Callable[[], Tried]) -> Tried:
-        """What comes of some work, with the boxes that it tried; nothing else changes here."""
-        before = self.slices
-        try:
-            tried = work()
-        except (GeometryError, ShapelyError):
-            tried = Tried(failed=True)
-        trials, self.slices = self.slices - before, before
-        return replace(tried, trials=trials)
+        for _ in range(number):
+            found, self._attempts = None, self._attempts + 1
+            with suppress(GeometryError, ShapelyError):
+                if self._start_inside:
+                    found, blocked = self._attempt(self._attempts, progress, part=part)
+                    self.object_blocked = self.object_blocked + 1 if blocked else 0
+            yield found
 
     def around(self, guide: FloatArray) -> BoxSequence | None:
         """Sample paths around another one, which need not be free, and cover them at margin zero.
@@ -287,11 +165,13 @@ class SampledSearch:
         Returns:
             The boxes, or None if no path was found or covered.
         """
+        if not self._start_inside:
+            return None
         for number in range(LIGHT_ATTEMPTS + 1, LIGHT_ATTEMPTS + 1 + len(CLEARANCES)):
-            tried = self._counted(partial(self._attempt, number, None, guide))
-            self.slices += tried.trials
-            if tried.found is not None:
-                return tried.found
+            with suppress(GeometryError, ShapelyError):
+                found, _ = self._attempt(number, None, guide)
+                if found is not None:
+                    return found
         return None
 
     def _attempt(
@@ -300,9 +180,8 @@ class SampledSearch:
         progress: Callable[[float], None] | None,
         guide: FloatArray | None = None,
         part: tuple[int, ...] | None = None,
-    ) -> Tried:
-        if not self._start_inside:
-            return Tried()
+    ) -> tuple[BoxSequence | None, bool]:
+        """The boxes along a sampled path, if any, and whether no path was found even for the object alone."""
         clearance, gap = CLEARANCES[(number - 1) % len(CLEARANCES)]
         workspace = marginal_workspace(self._problem, clearance)
         sampler = Sampler(self._hierarchy, workspace, gap, number - 1, progress)
@@ -322,7 +201,7 @@ class SampledSearch:
             found = self._covered(path, 0.0, longest=True)
             if found is not None:
                 break
-        return Tried(found, path, sampler.object_blocked)
+        return found, sampler.object_blocked
 
     def narrow_attempt(
         self,
@@ -333,31 +212,67 @@ class SampledSearch:
     ) -> BoxSequence | None:
         """Look for a path through passages that are too narrow for samples, and cover it at margin zero.
 
+        Paths on larger floors are repaired until they fit the floor. Of those that almost do, the best ones
+        are moved to the middle of their passages, and covered with the smallest boxes: a transport through
+        these takes long.
+
         Args:
-            number: How many such attempts there were before.
-            progress: Called with the fraction of an attempt that is done.
-            object_first: Whether a path of the object alone is to be found before one of the team.
+            number: How many such attempts there were before; each has other random numbers.
+            progress: Called with the fraction of a path that is done.
+            object_first: Whether, but in the first attempt, a path of the object alone is to be found and
+                repaired before one of the team. This is not done for parts of the team with robots: their
+                paths are repaired to other places than the team's, and ways were lost by it.
 
         Returns:
             The boxes, or None if no path was found or covered.
         """
-        if not self._start_inside:
-            return None
-        done: list[Tried] = []
-        for one in self._narrow.tries(number, progress, object_first=object_first):
-            tried = self._counted(one)
-            self.slices += tried.trials
-            if tried.failed or tried.found is not None:
-                return tried.found
-            done.append(tried)
-        try:
-            return self._narrow.through_middle(done)
-        except (GeometryError, ShapelyError):
-            return None
+        first = SEEDS_PER_GROWTH * max(0, number - 1)
+        ways = product(range(first, first + SEEDS_PER_GROWTH), FLOOR_GROWTHS)
+        fitting = list[tuple[float, FloatArray]]()
+        with suppress(GeometryError, ShapelyError):
+            for seed, growth in ways if self._start_inside else ():
+                path = self._on_larger_floor(number > 0, object_first, seed, growth, progress)
+                if not len(path):
+                    continue
+                path, short = repaired(self._problem, path, growth)
+                found = None if short > 0.0 else self._covered(path, 0.0, longest=True)
+                if found is not None:
+                    return found
+                if short < CENTRED_SHORT:
+                    fitting.append((short, path))
+            for needed, path in sorted(fitting, key=lambda one: one[0])[:CENTRED_PATHS]:
+                moved, short = centred(self._problem, path, needed)
+                found = None if short > 0.0 else self._covered(moved, 0.0, longest=True, smallest=True)
+                if found is not None:
+                    return found
+        return None
 
-    def _closely(self, path: FloatArray, smallest: bool) -> BoxSequence | None:
-        """Cover a path at margin zero by the longest boxes, or by small ones that need little space."""
-        return self._covered(path, 0.0, longest=True, smallest=smallest)
+    def _on_larger_floor(
+        self,
+        direct: bool,
+        object_first: bool,
+        seed: int,
+        growth: float,
+        progress: Callable[[float], None] | None,
+    ) -> FloatArray:
+        """Sample a path with walls moved back; no rows if none is found.
+
+        The first attempt adds robot after robot, later ones sample all robots at once: added one by one they
+        go where the object alone goes most easily.
+        """
+        floor = widened_floor(self._problem.workspace, growth)
+        sampler = Sampler(self._hierarchy, floor, BODY_GAP, seed, progress)
+        if not direct:
+            return sampler.path(NARROW_SAMPLES)
+        if not object_first:
+            return sampler.direct_path(NARROW_SAMPLES)
+        guide = sampler.direct((), NARROW_SAMPLES)
+        if guide is None:
+            return np.empty((0, len(self._problem.start)))
+        path, short = repaired(self._hierarchy.subsystem(()).question, guide.path, growth)
+        if short > CENTRED_SHORT:
+            return np.empty((0, len(self._problem.start)))
+        return sampler.path_around(GuidePath(path, guide.joints), NARROW_SAMPLES)
 
     def with_margin(
         self, first: BoxSequence, progress: Callable[[float, float], None], share: float = 1.0

@@ -45,90 +45,10 @@ from coop_drake.planning.questions import (
     within_limits,
 )
 from coop_drake.planning.rescaling import Rescaling
-from coop_drake.planning.sampled_search import BoxSequence, SampledSearch, Tried, ending_freely
+from coop_drake.planning.sampled_search import BoxSequence, SampledSearch, ending_freely
 from coop_drake.progress import Progress
 from coop_drake.tree.levers import usual_unit
 from coop_drake.tree.pose import FloatArray
-
-# Search by cells alone, without samples: with our order of splits, or as the paper prints it.
-
-MARGIN_BUDGET_DIVISOR = 8
-"""An exploration at a margin may make this fraction of the slices, one in eight: most of them fail, and a
-plan at margin zero exists already."""
-
-
-def search_by_cells(
-    problem: PlanningProblem, progress: Progress | None = None, watch: Watch | None = None
-) -> tuple[Channel | NoChannel, SearchReport]:
-    """Search by cells alone; only an exploration at margin zero may answer "infeasible".
-
-    Args:
-        problem: The question. Its strategy is ``cells``, which also tries margins once there is a channel at
-            margin zero, or ``paper``, which always uses margin zero.
-        progress: Called with a phase and the fraction of the slices that are made.
-        watch: Called with the events of explorations.
-
-    Returns:
-        The channel, or why there is none, and a report.
-    """
-    exploration, outcome = _explored_at(problem, 0.0, progress, watch)
-    slices = outcome.slices
-    if outcome.verdict is not Verdict.FOUND:
-        return _no_channel(problem, exploration, outcome), SearchReport(slices)
-    for margin in margins(problem.settings.margin) if problem.settings.strategy == "cells" else ():
-        wider, found = _explored_at(problem, margin, progress, watch)
-        slices += found.slices
-        if found.verdict is Verdict.FOUND:
-            boxes = _boxes_at_margin(problem, wider.boxes(found.path))
-            return make_channel(problem, boxes, margin, None), SearchReport(slices)
-    return make_channel(problem, exploration.boxes(outcome.path), 0.0, None), SearchReport(slices)
-
-
-def _explored_at(
-    problem: PlanningProblem, margin: float, progress: Progress | None, watch: Watch | None
-) -> tuple[Subdivision, ExplorationResult]:
-    """Explore at a margin, with all slices at margin zero and with a fraction of them at others."""
-    budget = problem.settings.max_slices
-    exploration = _exploration(problem, margin, watch)
-    report = None
-    if progress is not None:
-        phase = f"exploring slices at margin {margin:.3f} m"
-        report = lambda count: progress(phase, count / budget)  # noqa: E731
-    return exploration, exploration.run(budget // MARGIN_BUDGET_DIVISOR if margin > 0.0 else budget, report)
-
-
-def _exploration(problem: PlanningProblem, margin: float, watch: Watch | None) -> Subdivision:
-    workspace = marginal_workspace(problem, margin)
-    if problem.settings.strategy == "paper":
-        return PaperExploration(problem, workspace, watch)
-    words = f"the whole team at margin {margin:.3f} m" if margin > 0.0 else "the whole team"
-    return Exploration(problem, workspace, watch, words)
-
-
-def _boxes_at_margin(problem: PlanningProblem, found: list[FreeBox]) -> list[FreeBox]:
-    """Boxes whose cores were found at a margin, with the positions around them that are free without it."""
-    swept = SweptTree(problem.tree)
-    maker = CellMaker(swept, BodyPairs(swept), problem.workspace)
-
-    def around(box: FreeBox) -> FreeBox:
-        regions = (to_polygon(region.section) for region in maker.under_cells(box.intervals))
-        return replace(box, polygon=max(regions, key=lambda full: full.intersection(box.core).area))
-
-    return list(map(around, found))
-
-
-def _no_channel(problem: PlanningProblem, exploration: Subdivision, outcome: ExplorationResult) -> NoChannel:
-    """The answer of an exploration at margin zero that found no channel."""
-    if outcome.verdict is Verdict.INFEASIBLE:
-        witnesses = Witnesses(problem.tree, exploration.swept, exploration.pairs, exploration.maker)
-        proof = slices_proof(problem, exploration.slices, exploration.over_leaves(), witnesses)
-        if proof is None:
-            return NoChannel(False, "a proof of infeasibility was found but cannot be written down")
-        reason = f"the over-approximations of {outcome.slices} slices separate start from goal"
-        return NoChannel(True, reason, proof)
-    reason = outcome.verdict.explanation(outcome.slices)
-    return NoChannel(False, reason, mixed=exploration.undecided(outcome.path))
-
 
 FURTHER_ATTEMPTS, ATTEMPTS_PER_ROUND = 2, 3
 """Sampled attempts after the first one, and those in every round of explorations."""
@@ -314,14 +234,13 @@ class _Search:
         """Sample paths and cover them with boxes; fewer times if the object alone seems blocked."""
         return self._first_of(self._attempts(attempts))
 
-    def _attempts(self, number: int) -> Iterator[Tried]:
+    def _attempts(self, number: int) -> Iterator[BoxSequence | None]:
         return self._samples.attempts(number, self._phase("sampling paths"), self._proofs.blocked_part)
 
-    def _first_of(self, attempts: Iterator[Tried]) -> BoxSequence | None:
+    def _first_of(self, attempts: Iterator[BoxSequence | None]) -> BoxSequence | None:
         """The first boxes of some attempts; attempts end where the object alone seems blocked."""
         self._phase("sampling paths")(0.0)
-        for tried in attempts:
-            found = self._samples.taken(tried)
+        for found in attempts:
             if found is not None:
                 self._first_plan = thread_time() - self._began
                 return found
@@ -385,3 +304,83 @@ class _Search:
         """A function that reports the fraction of a phase that is done."""
         progress = self._progress
         return (lambda fraction: None) if progress is None else (lambda fraction: progress(name, fraction))
+
+
+# Search by cells alone, without samples: with our order of splits, or as the paper prints it.
+
+MARGIN_BUDGET_DIVISOR = 8
+"""An exploration at a margin may make this fraction of the slices, one in eight: most of them fail, and a
+plan at margin zero exists already."""
+
+
+def search_by_cells(
+    problem: PlanningProblem, progress: Progress | None = None, watch: Watch | None = None
+) -> tuple[Channel | NoChannel, SearchReport]:
+    """Search by cells alone; only an exploration at margin zero may answer "infeasible".
+
+    Args:
+        problem: The question. Its strategy is ``cells``, which also tries margins once there is a channel at
+            margin zero, or ``paper``, which always uses margin zero.
+        progress: Called with a phase and the fraction of the slices that are made.
+        watch: Called with the events of explorations.
+
+    Returns:
+        The channel, or why there is none, and a report.
+    """
+    exploration, outcome = _explored_at(problem, 0.0, progress, watch)
+    slices = outcome.slices
+    if outcome.verdict is not Verdict.FOUND:
+        return _no_channel(problem, exploration, outcome), SearchReport(slices)
+    for margin in margins(problem.settings.margin) if problem.settings.strategy == "cells" else ():
+        wider, found = _explored_at(problem, margin, progress, watch)
+        slices += found.slices
+        if found.verdict is Verdict.FOUND:
+            boxes = _boxes_at_margin(problem, wider.boxes(found.path))
+            return make_channel(problem, boxes, margin, None), SearchReport(slices)
+    return make_channel(problem, exploration.boxes(outcome.path), 0.0, None), SearchReport(slices)
+
+
+def _explored_at(
+    problem: PlanningProblem, margin: float, progress: Progress | None, watch: Watch | None
+) -> tuple[Subdivision, ExplorationResult]:
+    """Explore at a margin, with all slices at margin zero and with a fraction of them at others."""
+    budget = problem.settings.max_slices
+    exploration = _exploration(problem, margin, watch)
+    report = None
+    if progress is not None:
+        phase = f"exploring slices at margin {margin:.3f} m"
+        report = lambda count: progress(phase, count / budget)  # noqa: E731
+    return exploration, exploration.run(budget // MARGIN_BUDGET_DIVISOR if margin > 0.0 else budget, report)
+
+
+def _exploration(problem: PlanningProblem, margin: float, watch: Watch | None) -> Subdivision:
+    workspace = marginal_workspace(problem, margin)
+    if problem.settings.strategy == "paper":
+        return PaperExploration(problem, workspace, watch)
+    words = f"the whole team at margin {margin:.3f} m" if margin > 0.0 else "the whole team"
+    return Exploration(problem, workspace, watch, words)
+
+
+def _boxes_at_margin(problem: PlanningProblem, found: list[FreeBox]) -> list[FreeBox]:
+    """Boxes whose cores were found at a margin, with the positions around them that are free without it."""
+    swept = SweptTree(problem.tree)
+    maker = CellMaker(swept, BodyPairs(swept), problem.workspace)
+
+    def around(box: FreeBox) -> FreeBox:
+        regions = (to_polygon(region.section) for region in maker.under_cells(box.intervals))
+        return replace(box, polygon=max(regions, key=lambda full: full.intersection(box.core).area))
+
+    return list(map(around, found))
+
+
+def _no_channel(problem: PlanningProblem, exploration: Subdivision, outcome: ExplorationResult) -> NoChannel:
+    """The answer of an exploration at margin zero that found no channel."""
+    if outcome.verdict is Verdict.INFEASIBLE:
+        witnesses = Witnesses(problem.tree, exploration.swept, exploration.pairs, exploration.maker)
+        proof = slices_proof(problem, exploration.slices, exploration.over_leaves(), witnesses)
+        if proof is None:
+            return NoChannel(False, "a proof of infeasibility was found but cannot be written down")
+        reason = f"the over-approximations of {outcome.slices} slices separate start from goal"
+        return NoChannel(True, reason, proof)
+    reason = outcome.verdict.explanation(outcome.slices)
+    return NoChannel(False, reason, mixed=exploration.undecided(outcome.path))

@@ -11,7 +11,7 @@ from benchmarks.planner.family import corridor_problem
 from coop_drake.geometry.convex import following
 from coop_drake.geometry.parts import polygon_rings
 from coop_drake.planning import Channel, find_channel, sampled_search
-from coop_drake.planning.sampled_search import NarrowSearch
+from coop_drake.planning.sampled_search import SampledSearch
 from coop_drake.planning.sampling.band import clearances
 from coop_drake.planning.sampling.collision import grid_for_team
 from coop_drake.planning.sampling.narrow_passages import (
@@ -24,7 +24,7 @@ from coop_drake.planning.sampling.narrow_passages import (
     wall_contacts,
     widened_floor,
 )
-from coop_drake.planning.sampling.sampler import Sampler, SubsystemHierarchy
+from coop_drake.planning.sampling.sampler import Sampler
 from coop_drake.tree.team_arrays import team_arrays
 from tests.planning.test_search import rod_problem
 from tests.support.cases import case, transport
@@ -87,12 +87,13 @@ def test_the_team_is_sampled_only_where_the_object_alone_almost_fits(monkeypatch
 
     monkeypatch.setattr(Sampler, "_connect", connect)
     monkeypatch.setattr(sampled_search, "NARROW_SAMPLES", 4_000)
-    search = NarrowSearch(problem, SubsystemHierarchy(problem), lambda path, smallest: None)
-    tried = search.tries(1, None, object_first=True)[0]()
+    growth = sampled_search.FLOOR_GROWTHS[0]
+    path = SampledSearch(problem)._on_larger_floor(True, True, 0, growth, None)
     assert max(sampled) == sampled_joints
-    assert (tried.path is not None) == (sampled_joints > 0)
-    if tried.path is not None:
-        assert are_free(problem, tried.path).all() == (tried.short <= 0.0)
+    assert (len(path) > 0) == (sampled_joints > 0)
+    if len(path) > 0:
+        path, short = repaired(problem, path, growth)
+        assert are_free(problem, path).all() == (short <= 0.0)
 
 
 @pytest.mark.slow
