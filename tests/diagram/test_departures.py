@@ -9,16 +9,20 @@ import pytest
 from pydrake.systems.analysis import Simulator
 
 from coop_drake.diagram import build_closed_loop, build_station
+from coop_drake.errors import ScenarioError
 from coop_drake.plant import set_configuration
 from coop_drake.scenario import (
     Deployment,
     Floor,
+    JointFriction,
     PlantSettings,
     PoseBias,
     Push,
     RobotDepartures,
     Silence,
 )
+from coop_drake.scenario.deployment_checks import check_deployment
+from coop_drake.simulation import configure_simulator
 from tests.support.small_loop import small_maps, small_problem
 from tests.support.small_scenario import small_scenario
 
@@ -151,6 +155,43 @@ def test_friction_brakes_a_moving_team():
     moving = np.array([0.5, 0.0, 0.0, 0.0, 0.0])
     assert object_acceleration(scenario, rates=moving)[0] == pytest.approx(-2 * 20.5 / 17.0, rel=0.2)
     np.testing.assert_array_equal(object_acceleration(scenario), 0.0)
+
+
+def test_friction_of_joints_holds_them_at_rest_against_less_and_not_against_more():
+    """A joint that moves comes to rest, and then stays where it is; it does not creep."""
+    friction = Deployment(joint_friction=JointFriction(coulomb=0.5))
+    scenario = replace(small_scenario("base"), deployment=friction)
+    station = build_station(scenario)
+    simulator = Simulator(station.diagram)
+    configure_simulator(simulator, scenario)
+    root, team = simulator.get_mutable_context(), station.team
+    context, joints = team.plant.GetMyMutableContextFromRoot(root), team.velocity_index[3:]
+    start, moving = np.array([3.0, 3.0, 0.2, 0.0, 0.0]), np.array([0.0, 0.0, 0.0, 0.1, -0.1])
+    set_configuration(team, context, start, moving)
+    efforts = [station.diagram.GetInputPort(f"robot_{k}_effort") for k in range(2)]
+    held = [port.FixValue(root, np.array([0.0, 0.0, 0.0, 0.3])) for port in efforts]
+    simulator.AdvanceTo(1.0)
+    rested = team.plant.GetPositions(context).copy()
+    assert (np.abs(team.plant.GetVelocities(context)[joints]) < 1e-9).all()
+    simulator.AdvanceTo(2.0)
+    away = np.abs(team.plant.GetPositions(context) - rested)[team.position_index[3:]]
+    assert (away < 1e-9).all()
+    for value in held:
+        value.GetMutableData().set_value(np.array([0.0, 0.0, 0.0, 0.55]))
+    simulator.AdvanceTo(2.5)
+    rates = team.plant.GetVelocities(context)[joints]
+    assert (rates > 1e-2).all()
+
+
+def test_friction_of_joints_is_refused_where_it_cannot_be_simulated():
+    scenario = replace(
+        small_scenario("base"),
+        deployment=Deployment(joint_friction=JointFriction(viscous=0.1)),
+        plant=PlantSettings(grasps="constraints"),
+    )
+    with pytest.raises(ScenarioError) as refused:
+        check_deployment(scenario, ("robot_0", "robot_1"))
+    assert refused.value.key == "deployment.joint_friction"
 
 
 def object_acceleration(scenario, time=0.0, rates=None):
