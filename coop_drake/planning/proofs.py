@@ -21,37 +21,12 @@ from coop_drake.planning.questions import marginal_workspace, relaxed, shrunk
 from coop_drake.planning.sampling.sampler import Sampler, SubsystemHierarchy
 from coop_drake.tree.pose import FloatArray
 
-# The relaxation test: which relaxations are worth a proof, because sampling finds no path for them.
-
 TEST_SAMPLES = 8_000
-"""Samples for every subsystem: twice those of a first attempt, because a failure costs an exploration."""
+"""Samples for every subsystem where it is tested whether a relaxation has a path: twice those of a first
+attempt, because a failure costs an exploration."""
 
 TEST_SEED = 101
-"""Seed of the samples, other than those of the search, which have failed already."""
-
-
-class RelaxationTest:
-    """Tests by sampling whether a part of the team has a path; a path makes a proof for that part impossible.
-
-    Args:
-        problem: The question.
-    """
-
-    def __init__(self, problem: PlanningProblem) -> None:
-        self._problem = problem
-        self._workspace = shrunk(problem.workspace, 0.0)
-        self._failed: dict[tuple[int, ...], bool] = {}
-
-    def finds_no_path(self, robots: tuple[int, ...]) -> bool:
-        """Whether sampling finds no path for the object with some robots, which proves nothing."""
-        if robots not in self._failed:
-            question, _ = relaxed(self._problem, robots)
-            sampler = Sampler(SubsystemHierarchy(question), self._workspace, 0.0, TEST_SEED)
-            self._failed[robots] = len(sampler.path(TEST_SAMPLES)) == 0
-        return self._failed[robots]
-
-
-# Tries to prove infeasibility by exploring the question and its relaxations in turns.
+"""Seed of these samples, other than those of the search, which have failed already."""
 
 WHOLE_DIVISOR = 2
 """While relaxations are explored too, the whole question gets half of the slices of each [-]: a refutation
@@ -99,7 +74,7 @@ class Proofs:
     def __init__(self, problem: PlanningProblem, watch: Watch | None = None) -> None:
         self._problem, self._watch = problem, watch
         self._all = tuple(sorted({joint.robot for joint in problem.tree.joints}))
-        self._test = RelaxationTest(problem)
+        self._pathless: dict[tuple[int, ...], bool] = {}
         self._explorations: dict[tuple[int, ...], Exploration] = {}
         self._outcomes: dict[tuple[int, ...], ExplorationResult] = {}
         self.refutation: Refutation | None = None
@@ -208,7 +183,15 @@ class Proofs:
         less = (part for part in self._outcomes if len(part) < len(chosen) and set(part) < set(chosen))
         if any(self._outcomes[part].verdict is not Verdict.FOUND for part in less):
             return False
-        return self._test.finds_no_path(chosen)
+        return self._finds_no_path(chosen)
+
+    def _finds_no_path(self, chosen: tuple[int, ...]) -> bool:
+        """Whether sampling finds no path for the object with some robots; with one there is no proof."""
+        if chosen not in self._pathless:
+            floor = shrunk(self._problem.workspace, 0.0)
+            sampler = Sampler(SubsystemHierarchy(relaxed(self._problem, chosen)[0]), floor, 0.0, TEST_SEED)
+            self._pathless[chosen] = len(sampler.path(TEST_SAMPLES)) == 0
+        return self._pathless[chosen]
 
     def _exploration(self, chosen: tuple[int, ...]) -> Exploration:
         if chosen not in self._explorations:

@@ -123,6 +123,8 @@ class CellGraph:
             lost += [other for other in self._after[k] if self._best[other] < inf]
         for k in lost:
             self._lead(k, -1)
+        for k in removed:
+            del self._after[k]
         around = set[int]()
         for k in lost:
             if k in self._graph:
