@@ -85,9 +85,14 @@ def _import(
 ) -> ExitCode:
     from coop_drake.errors import ScenarioError
     from coop_drake.files import write_atomically
-    from coop_drake.plant.gripper_frame import GRIPPER, has_gripper, scenario_lines, with_gripper
     from coop_drake.plant.importing import import_robot
-    from coop_drake.plant.joint_survey import survey_joints
+    from coop_drake.plant.joint_survey import (
+        GRIPPER,
+        has_gripper,
+        scenario_lines,
+        survey_joints,
+        with_gripper,
+    )
 
     target = out / model.name
     if target.exists() and not force:

@@ -1,14 +1,12 @@
 from .component_tree import read_component_tree
 from .configuration import base_poses, set_configuration
-from .limit_notes import joint_notes
 from .planar_chain import BaseChain, base_chain, robot_chain
-from .problem import planning_problem
+from .problem import joint_notes, planning_problem
 from .robot import RobotPlant, build_robot_plant
-from .run_masses import run_setup
+from .run_masses import run_setup, turning_coupling
 from .separate_team import SeparateTeam, build_separate_team
 from .team import ObjectInertia, RobotModel, TeamPlant, build_team_plant
 from .team_tree import TeamTree, read_team_tree
-from .turning import turning_coupling
 
 __all__ = [
     "BaseChain",

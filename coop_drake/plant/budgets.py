@@ -11,8 +11,7 @@ from coop_drake.answers.problem import PlanningProblem
 from coop_drake.errors import ScenarioError
 from coop_drake.laws import ScheduledGains
 from coop_drake.plant.component_tree import read_component_tree
-from coop_drake.plant.disagreement import largest_disagreement
-from coop_drake.plant.run_masses import base_frames, joint_inertias, moved_bodies
+from coop_drake.plant.run_masses import base_frames, joint_inertias, largest_disagreement, moved_bodies
 from coop_drake.plant.team import build_team_plant
 from coop_drake.scenario import Scenario
 from coop_drake.scenario.budget_file import ALL, POSITION, TeamMasses, read_budget

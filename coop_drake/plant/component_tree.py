@@ -1,23 +1,211 @@
-"""Reads the component tree, eq. (3), from the team's plant: bodies, joints and collision geometry."""
+"""The component tree of a team, its shapes being the shadows of its bodies on the floor."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import cos, pi, sin
 
 import numpy as np
-from pydrake.geometry import SceneGraphInspector
+import shapely
+from pydrake.geometry import (
+    Box,
+    Capsule,
+    Convex,
+    Cylinder,
+    Ellipsoid,
+    Mesh,
+    SceneGraphInspector,
+    Shape,
+    Sphere,
+)
 from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.multibody.tree import Joint, RigidBody
 from pydrake.systems.framework import Context
+from shapely import MultiPoint, Polygon, box
+from shapely.geometry.base import BaseGeometry
 
-from coop_drake.plant.chain import limits_of, scoped
-from coop_drake.plant.footprint import DIGITS, project
+from coop_drake.plant.chain import axis_in_world, limits_of, scoped
 from coop_drake.plant.parsing import bodies_of, joints_of, refusal
-from coop_drake.plant.planarity import axis_in_world
-from coop_drake.plant.shadows import without_covered
 from coop_drake.plant.team import TeamPlant
 from coop_drake.tree.component_tree import Body, Component, ComponentTree, ConvexShape, TreeJoint
-from coop_drake.tree.pose import PlanarPose
+from coop_drake.tree.pose import FloatArray, PlanarPose
+
+_FEW = 16
+"""Footprints with at most this many corners are not simplified."""
+
+_GROWTH = 0.003
+"""Largest growth of a footprint where corners are removed [m]."""
+
+
+def enclosed_in_fewer(points: FloatArray) -> FloatArray:
+    """Corners of a convex polygon that encloses another, and reaches no more than 3 mm beyond it.
+
+    Shapes (n, 2) [m]; fewer corners if the polygon given has many, otherwise its own.
+    """
+    from coop_drake.geometry.simplify import simplify_inward
+
+    if len(points) <= _FEW:
+        return points
+    inner = Polygon(points)
+    around = box(*inner.buffer(1.0).bounds)
+    (hole,) = simplify_inward(Polygon(around.exterior, [inner.exterior]), _GROWTH).interiors
+    outer = Polygon(hole).convex_hull
+    if not outer.buffer(1e-9).covers(inner):
+        return points
+    return shapely.get_coordinates(shapely.orient_polygons(outer))[:-1]
+
+
+def without_covered(bodies: tuple[Body, ...], may_overlap: frozenset[tuple[str, str]]) -> tuple[Body, ...]:
+    """Remove the shapes of a component that a shape of another body of the same robot covers.
+
+    A shape can be removed if everything that would collide with it also collides with the other one: the
+    other body must not be exempt from a collision that the shape's own body is not exempt from.
+
+    Args:
+        bodies: Bodies that are rigid with each other, in the component's frame.
+        may_overlap: Pairs of bodies that are never checked against each other.
+
+    Returns:
+        The same bodies in the same order, some with fewer shapes, or none.
+    """
+    exempt: dict[str, set[str]] = {body.name: set() for body in bodies}
+    for first, second in may_overlap:
+        exempt.setdefault(first, set()).add(second)
+        exempt.setdefault(second, set()).add(first)
+    every = [(body, shape) for body in bodies for shape in body.shapes]
+    sizes = [_core(shape).buffer(shape.radius).area for _, shape in every]
+    largest_first = sorted(range(len(every)), key=lambda place: -sizes[place])
+    kept: list[int] = []
+    for place in largest_first:
+        body, shape = every[place]
+        if not any(
+            other.robot == body.robot
+            and exempt[other.name] - {body.name} <= exempt[body.name]
+            and _covers(larger, shape)
+            for other, larger in (every[index] for index in kept)
+        ):
+            kept.append(place)
+    left = {id(every[place][1]) for place in kept}
+    return tuple(
+        Body(body.name, body.robot, tuple(shape for shape in body.shapes if id(shape) in left))
+        for body in bodies
+    )
+
+
+def _core(shape: ConvexShape) -> BaseGeometry:
+    return MultiPoint(shape.vertices).convex_hull
+
+
+def _covers(larger: ConvexShape, shape: ConvexShape) -> bool:
+    """Whether a convex shape contains another, which its corners decide."""
+    corners = shapely.points(shape.vertices)
+    return bool(np.all(shapely.distance(corners, _core(larger)) <= larger.radius - shape.radius))
+
+
+# Projects collision shapes to the floor; a footprint is a convex hull enlarged by a radius.
+
+
+SUPPORTS = 64
+"""Tangent lines that enclose a curved outline: the polygon exceeds it by at most 0.13 % of its radius."""
+
+DIGITS = 12
+"""Decimals of a metre that are kept; the rest is rounding of rotations in the files."""
+
+_FLAT = 1e-9
+"""Smallest horizontal part of a unit axis that is not taken for rounding [-]."""
+_THIN = 1e-6
+"""Radius that a footprint without an area gets [m]."""
+
+
+def project(shape: Shape, X_CG: RigidTransform) -> ConvexShape:
+    """Project a collision shape to the plane.
+
+    Footprints of spheres, capsules, boxes, hulls and upright or lying cylinders are exact. Ellipsoids and
+    tilted cylinders are enclosed by ``SUPPORTS`` tangents. A mesh counts as its convex hull, as in Drake's
+    proximity queries; a hull of many corners is enclosed by one of fewer, at most 3 mm larger.
+
+    Args:
+        shape: The shape in its geometry frame G.
+        X_CG: Pose of G in a frame C whose z axis is vertical.
+
+    Returns:
+        The footprint in C.
+
+    Raises:
+        TypeError: The shape has no bounded footprint, for example a half-space.
+    """
+    centre = X_CG.translation()[:2]
+    R = X_CG.rotation().matrix()
+    match shape:
+        case Sphere():
+            return ConvexShape(centre[None, :].round(DIGITS), shape.radius())
+        case Capsule():
+            arm = 0.5 * shape.length() * R[:2, 2]
+            return _capsule(centre, arm, shape.radius())
+        case Cylinder():
+            return _cylinder(centre, R[:, 2], shape.radius(), 0.5 * shape.length())
+        case Ellipsoid():
+            return _ellipsoid(centre, R[:2] * np.array([shape.a(), shape.b(), shape.c()]))
+        case Box():
+            corners = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
+            return hull(centre + (corners * shape.size()) @ R[:2].T)
+        case Convex() | Mesh():
+            solid = shape.GetConvexHull()
+            points = np.array([solid.vertex(i) for i in range(solid.num_vertices())])
+            shadow = hull(centre + points @ R[:2].T)
+            return ConvexShape(enclosed_in_fewer(shadow.vertices), shadow.radius)
+    raise TypeError(f"{type(shape).__name__} has no bounded footprint")
+
+
+def hull(points: FloatArray) -> ConvexShape:
+    """Convex hull of points in the plane, shape (n, 2) [m]; a flat hull gets a micrometre of thickness."""
+    outline = MultiPoint(points.round(DIGITS)).convex_hull
+    if not isinstance(outline, Polygon):
+        ends = np.array(outline.coords)
+        return ConvexShape(ends, _THIN)
+    ring = np.array(outline.exterior.coords)[:-1]
+    return ConvexShape(ring if outline.exterior.is_ccw else ring[::-1].copy())
+
+
+def _capsule(centre: FloatArray, arm: FloatArray, radius: float) -> ConvexShape:
+    if np.hypot(*arm) <= _FLAT:
+        return ConvexShape(centre[None, :].round(DIGITS), radius)
+    return ConvexShape(np.array([centre - arm, centre + arm]).round(DIGITS), radius)
+
+
+def _cylinder(centre: FloatArray, axis: FloatArray, radius: float, half_length: float) -> ConvexShape:
+    """Support along n: the disc's rim gives r sqrt(1 - (a.n)^2), the axis h |a.n|."""
+    if np.hypot(axis[0], axis[1]) <= _FLAT:
+        return ConvexShape(centre[None, :].round(DIGITS), radius)
+    along = np.arctan2(axis[1], axis[0])
+    angles = along + 2.0 * pi * np.arange(SUPPORTS) / SUPPORTS
+    share = np.cos(angles) * axis[0] + np.sin(angles) * axis[1]
+    support = radius * np.sqrt(np.maximum(0.0, 1.0 - share**2)) + half_length * np.abs(share)
+    return hull(centre + _tangent_corners(angles, support))
+
+
+def _ellipsoid(centre: FloatArray, shadow: FloatArray) -> ConvexShape:
+    """Support along n: |shadow^T n|, with shadow the projected semi-axes as columns, shape (2, 3)."""
+    squares = np.linalg.eigvalsh(shadow @ shadow.T)
+    if squares[1] - squares[0] <= _FLAT * squares[1]:
+        return ConvexShape(centre[None, :].round(DIGITS), float(np.sqrt(squares[1])))
+    angles = 2.0 * pi * np.arange(SUPPORTS) / SUPPORTS
+    normals = np.column_stack([np.cos(angles), np.sin(angles)])
+    return hull(centre + _tangent_corners(angles, np.linalg.norm(normals @ shadow, axis=1)))
+
+
+def _tangent_corners(angles: FloatArray, support: FloatArray) -> FloatArray:
+    """Corners between neighbouring tangent lines n(angle) . x = support, shape (n, 2)."""
+    step = 2.0 * pi / len(angles)
+    following = np.roll(support, -1)
+    across = (following - support * cos(step)) / sin(step)
+    normals = np.column_stack([np.cos(angles), np.sin(angles)])
+    tangents = np.column_stack([-np.sin(angles), np.cos(angles)])
+    return support[:, None] * normals + across[:, None] * tangents
+
+
+# Reads the component tree, eq. (3), from the team's plant: bodies, joints and collision geometry.
+
 
 _LARGEST = 1e4
 """Largest distance of a footprint from its joint; more is taken for an error in the file [m]."""

@@ -3,7 +3,7 @@
 import numpy as np
 from pydrake.systems.framework import Context
 
-from coop_drake.plant.planarity import planar_pose
+from coop_drake.plant.chain import planar_pose
 from coop_drake.plant.team import TeamPlant
 from coop_drake.scenario import Deployment
 from coop_drake.tree.pose import FloatArray

@@ -13,7 +13,7 @@ import numpy as np
 
 from coop_drake.errors import ScenarioError
 from coop_drake.files import check_readable
-from coop_drake.plant.limit_notes import limit_notes
+from coop_drake.plant.problem import limit_notes
 from coop_drake.tree.pose import FloatArray
 
 if TYPE_CHECKING:

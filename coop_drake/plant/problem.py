@@ -1,14 +1,280 @@
-"""Builds the planning problem from a scenario and its plant."""
+"""The planning problem of a scenario: limits, start and goal, and that they are allowed."""
 
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import replace
+from math import inf
+from pathlib import Path
+from typing import TYPE_CHECKING
+from xml.etree import ElementTree
+
+import numpy as np
+from pydrake.multibody.tree import Joint
 from pydrake.systems.framework import DiagramBuilder
 
-from coop_drake.answers.problem import PlanningProblem
+from coop_drake.answers.limits import TeamLimits
+from coop_drake.answers.problem import PlanningProblem, object_radius
+from coop_drake.errors import ScenarioError
+from coop_drake.plant.chain import limits_of, planar_pose
 from coop_drake.plant.component_tree import read_component_tree
-from coop_drake.plant.limits import read_limits
-from coop_drake.plant.stated_problem import stated_problem
-from coop_drake.plant.team import TeamPlant, build_team_plant
-from coop_drake.plant.validation import check_joints, check_places
-from coop_drake.scenario import Scenario
+from coop_drake.plant.parsing import refusal
+from coop_drake.plant.placement import collisions, core, wall_clearance
+from coop_drake.plant.team import RobotModel, TeamPlant, build_team_plant
+from coop_drake.scenario import Scenario, assemble
+from coop_drake.scenario.limits import ALL_ROBOTS, RobotLimits
+from coop_drake.tree.component_tree import ComponentTree
+from coop_drake.tree.pose import FloatArray
+
+
+def read_limits(team: TeamPlant, tree: ComponentTree) -> TeamLimits:
+    """Read the limits of the joints, and where the bases' frames are.
+
+    Raises:
+        ScenarioError: A joint cannot move because a limit is zero.
+    """
+    components = tuple(_base_component(team, tree, robot) for robot in team.robots)
+    poses = tree.poses(np.zeros(3 + len(tree.joints)))
+    context = team.plant.CreateDefaultContext()
+    team.plant.SetPositions(context, np.zeros(team.plant.num_positions()))
+    placed = [planar_pose(robot.base_body.EvalPoseInWorld(context)) for robot in team.robots]
+    points = [
+        poses[component].inverse().apply(np.array([[pose.x, pose.y]]))[0]
+        for component, pose in zip(components, placed, strict=True)
+    ]
+    unknown, joints = np.full(len(team.robots), inf), _moving(team)
+    return TeamLimits(
+        base_components=components,
+        base_points=tuple((float(x), float(y)) for x, y in points),
+        base_speeds=unknown,
+        turn_rates=unknown.copy(),
+        joint_rates=_of_joints(team, joints, "velocity"),
+        joint_accelerations=_of_joints(team, joints, "acceleration"),
+        joint_efforts=np.array([_effort(team, joint) for _, joint, _ in joints]),
+    )
+
+
+def _base_component(team: TeamPlant, tree: ComponentTree, robot: RobotModel) -> int:
+    """Index of the component of a base: the last one that a joint between object and base moves."""
+    joints = dict(zip(robot.joint_names, robot.joints, strict=True))
+    base, moving = robot.base_body.index(), 0
+    for index, component in enumerate(tree.components):  # parents before children
+        joint = None if component.joint is None else joints.get(component.joint.name)
+        if joint is not None and base in team.plant.GetBodiesKinematicallyAffectedBy([joint.index()]):
+            moving = index
+    return moving
+
+
+def _moving(team: TeamPlant) -> list[tuple[RobotModel, Joint, str]]:
+    """Return all joints in the order of q, each with its robot and its name."""
+    return [
+        (robot, joint, name)
+        for robot in team.robots
+        for joint, name in zip(robot.joints, robot.joint_names, strict=True)
+    ]
+
+
+def _of_joints(team: TeamPlant, joints: Sequence[tuple[RobotModel, Joint, str]], kind: str) -> FloatArray:
+    """Return the smaller magnitude of the lower and the upper limit of every joint; infinity for none."""
+    limits = []
+    for robot, joint, name in joints:
+        lower, upper = (
+            getattr(joint, f"{kind}_lower_limits")()[0],
+            getattr(joint, f"{kind}_upper_limits")()[0],
+        )
+        limits.append(float(min(-lower, upper)))
+        if not limits[-1] > 0.0:
+            models = team.assembly.robots[robot.index]
+            allowed = f"a {kind} limit above zero, not {limits[-1] + 0.0:g}; or a value under fixed_joints"
+            raise refusal(team.scenario, models, name, allowed)
+    return np.array(limits)
+
+
+def _effort(team: TeamPlant, joint: Joint) -> float:
+    """Return the effort limit of a joint's motor, infinity for none [N m or N]."""
+    plant = team.plant
+    motors = (plant.get_joint_actuator(index) for index in plant.GetJointActuatorIndices())
+    return min((float(m.effort_limit()) for m in motors if m.joint().index() == joint.index()), default=inf)
+
+
+# Names joints whose kind and limits differ: continuous ones should have no limits, revolute ones two.
+
+
+if TYPE_CHECKING:
+    from xml.etree.ElementTree import Element
+
+
+def limit_notes(root: Element, among: Collection[str] | None = None) -> list[str]:
+    """Say of which joints of a model limits are kept or left aside although their kind says otherwise.
+
+    ``root`` is that of the model's file, and ``among`` are the names of the joints that count, None for all.
+    """
+    endless, limited = list[str](), list[str]()
+    for joint in root.iter("joint"):
+        limit, kind, name = next(joint.iter("limit"), None), joint.get("type"), str(joint.get("name"))
+        known = limit is not None and any(limit.get(k) or limit.findtext(k) for k in ("lower", "upper"))
+        if among is None or name in among:
+            endless += [name] if kind == "revolute" and not known else []
+            limited += [name] if kind == "continuous" and known else []
+    kept = "do not count" if root.tag == "sdf" else "are kept, so that these are no circles"
+    notes = {
+        "revolute joints without limits are circles, as continuous ones": endless,
+        f"limits of continuous joints {kept}": limited,
+    }
+    return [f"{note}: {', '.join(names)}" for note, names in notes.items() if names]
+
+
+def joint_notes(scenario: Scenario, problem: PlanningProblem) -> tuple[str, ...]:
+    """Say the same of the joints that a scenario's team moves, each with the model's file."""
+    moved = {joint.name.rpartition("::")[2] for joint in problem.tree.joints}
+    models = [directive.add_model for directive in assemble(scenario).directives]
+    files = dict.fromkeys(Path(model.file.removeprefix("file://")) for model in models if model)
+    return tuple(
+        f"{path.name}: {note}"
+        for path in files
+        for note in limit_notes(ElementTree.parse(path).getroot(), moved)
+    )
+
+
+# The planning problem that a scenario states about a team whose component tree is known.
+
+
+def stated_problem(
+    scenario: Scenario, tree: ComponentTree, joints: Mapping[str, int], limits: TeamLimits
+) -> PlanningProblem:
+    """Put floor, team, start and goal together.
+
+    Args:
+        scenario: The scenario; its joint values have been checked, or will be.
+        tree: The team as seen from the object.
+        joints: The robots in their order, each with its number of joints.
+        limits: What the models say about limits.
+    """
+    start, goal = scenario.start, scenario.goal
+    values = [value for robot in joints for value in start.joints.get(robot, ())]
+    return PlanningProblem(
+        workspace=scenario.workspace.polygon,
+        tree=tree,
+        start=np.array([start.object.x, start.object.y, start.object.theta, *values]),
+        goal_pose=np.array([goal.object.x, goal.object.y, goal.object.theta]),
+        goal_joints=tuple(
+            value for robot, count in joints.items() for value in goal.joints.get(robot, (None,) * count)
+        ),
+        position_tolerance=goal.tolerances.position,
+        angle_tolerance=goal.tolerances.angle,
+        joint_tolerance=goal.tolerances.joint,
+        settings=scenario.planner,
+        limits=_stated_limits(scenario, joints, limits),
+    )
+
+
+def _stated_limits(scenario: Scenario, joints: Mapping[str, int], limits: TeamLimits) -> TeamLimits:
+    """Limits of the models with those that the scenario states in their place."""
+    speeds, turns = limits.base_speeds.copy(), limits.turn_rates.copy()
+    rates, accelerations = limits.joint_rates.copy(), limits.joint_accelerations.copy()
+    first = 0
+    for k, (robot, count) in enumerate(joints.items()):
+        stated = scenario.limits.get(robot, scenario.limits.get(ALL_ROBOTS, RobotLimits()))
+        speeds[k] = speeds[k] if stated.base_speed is None else stated.base_speed
+        turns[k] = turns[k] if stated.base_turn_rate is None else stated.base_turn_rate
+        for values, given in ((rates, stated.joint_rates), (accelerations, stated.joint_accelerations)):
+            for i, value in enumerate(given * count if len(given) == 1 else given):
+                values[first + i] = values[first + i] if value is None else value
+        first += count
+    return replace(
+        limits, base_speeds=speeds, turn_rates=turns, joint_rates=rates, joint_accelerations=accelerations
+    )
+
+
+# Checks of a scenario that need its bodies and joints: joint values, start and goal.
+
+
+def check_joints(scenario: Scenario, team: TeamPlant) -> None:
+    """Refuse joint values that do not match the robots' joints and limits.
+
+    Raises:
+        ScenarioError: An unknown robot, a wrong number of values, a value outside its joint's limits.
+    """
+    _check_section(scenario, team, "start.joints", scenario.start.joints)
+    tolerance = scenario.goal.tolerances.joint
+    _check_section(scenario, team, "goal.joints", scenario.goal.joints, tolerance)
+    _check_rates(scenario, team)
+    count, given = sum(len(robot.joints) for robot in team.robots), scenario.deployment.start_offset.joints
+    if given and len(given) != count:
+        allowed = f"an empty list, or one of {count}, a number for every joint"
+        raise ScenarioError(str(scenario.path), "deployment.start_offset.joints", list(given), allowed)
+    for robot in team.robots:
+        if robot.joints and robot.name not in scenario.start.joints:
+            allowed = f"a list of {len(robot.joints)}, the values of {', '.join(robot.joint_names)}"
+            raise ScenarioError(str(scenario.path), f"start.joints.{robot.name}", None, allowed)
+
+
+def _check_section(
+    scenario: Scenario,
+    team: TeamPlant,
+    key: str,
+    section: Mapping[str, Sequence[float | None]],
+    tolerance: float = 0.0,
+) -> None:
+    file = str(scenario.path)
+    robots = {robot.name: robot for robot in team.robots}
+    for name, values in section.items():
+        if name not in robots:
+            raise ScenarioError(file, f"{key}.{name}", name, "a robot, one of " + ", ".join(robots))
+        robot = robots[name]
+        if len(values) != len(robot.joints):
+            names = ", ".join(robot.joint_names) or "no joints"
+            allowed = f"a list of {len(robot.joints)}, the values of {names}"
+            raise ScenarioError(file, f"{key}.{name}", list(values), allowed)
+        for place, (value, joint) in enumerate(zip(values, robot.joints, strict=True)):
+            lower, upper = limits_of(joint)
+            if value is not None and not lower - tolerance <= value <= upper + tolerance:
+                allowed = f"a value of {robot.joint_names[place]} between its limits {lower:g} and {upper:g}"
+                allowed += (
+                    f", or beyond one by the tolerance {tolerance:g} at most" if tolerance > 0.0 else ""
+                )
+                raise ScenarioError(file, f"{key}.{name}[{place}]", value, allowed)
+
+
+def _check_rates(scenario: Scenario, team: TeamPlant) -> None:
+    """Refuse limits of joints that are not as many as the joints."""
+    for robot in team.robots:
+        name = robot.name if robot.name in scenario.limits else ALL_ROBOTS
+        stated = scenario.limits.get(name, RobotLimits())
+        for key in ("joint_rates", "joint_accelerations"):
+            given = getattr(stated, key)
+            if len(given) not in (0, 1, len(robot.joints)):
+                names = ", ".join(robot.joint_names) or "no joints"
+                allowed = f"one for all joints, or a list of {len(robot.joints)}, for {names} of {robot.name}"
+                raise ScenarioError(str(scenario.path), f"limits.{name}.{key}", list(given), allowed)
+
+
+def check_places(scenario: Scenario, problem: PlanningProblem) -> None:
+    """Refuse a start in collision, and a goal where the object leaves the floor by more than its tolerances.
+
+    Raises:
+        ScenarioError: With the bodies and their clearance.
+    """
+    file = str(scenario.path)
+    for first, second, clearance in collisions(problem.tree, problem.start, problem.workspace):
+        allowed = f"a configuration without collision ({first} touches {second}, clearance {clearance:.4f} m)"
+        raise ScenarioError(file, "start", problem.start.tolist(), allowed)
+    goal = scenario.goal.object.pose
+    room = problem.position_tolerance + object_radius(problem.tree) * problem.angle_tolerance
+    for body in problem.tree.components[0].bodies:
+        # What is deeper inside a body than its points move within the tolerances stays in it.
+        held = [core(shape, goal).buffer(shape.radius - room) for shape in body.shapes]
+        if body.robot is None and any(
+            not problem.workspace.contains(one) for one in held if not one.is_empty
+        ):
+            clearance = wall_clearance(body, goal, problem.workspace)
+            found = f"{body.name} touches the walls, clearance {clearance:.4f} m"
+            raise ScenarioError(
+                file, "goal.object", [goal.x, goal.y, goal.angle], f"a pose inside the workspace ({found})"
+            )
+
+
+# Builds the planning problem from a scenario and its plant.
 
 
 def planning_problem(scenario: Scenario, team: TeamPlant | None = None) -> PlanningProblem:

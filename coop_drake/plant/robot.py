@@ -20,10 +20,8 @@ from pydrake.multibody.tree import (
 )
 from pydrake.systems.framework import Context
 
-from coop_drake.plant.chain import find_base
-from coop_drake.plant.fixing import fix_joints
-from coop_drake.plant.parsing import add_models, bodies_of, finalize, set_actuators
-from coop_drake.plant.read_once import read_once
+from coop_drake.plant.chain import find_base, fix_joints
+from coop_drake.plant.parsing import add_models, bodies_of, finalize, read_once, set_actuators
 from coop_drake.scenario import Scenario, assemble
 from coop_drake.tree.pose import FloatArray
 

@@ -11,8 +11,7 @@ from pydrake.systems.framework import DiagramBuilder
 
 from coop_drake.answers.digest import content_digest, tree_document
 from coop_drake.plant.component_tree import read_component_tree
-from coop_drake.plant.parsing import joints_of
-from coop_drake.plant.read_once import read_once
+from coop_drake.plant.parsing import joints_of, read_once
 from coop_drake.plant.team import build_team_plant
 from coop_drake.scenario import Scenario
 from coop_drake.typed_data import to_plain

@@ -1,10 +1,11 @@
-"""The whole team as one tree rooted at the object: the plant that is simulated."""
+"""The team as one plant, rooted at the object."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from pydrake.geometry import SceneGraph
@@ -18,17 +19,91 @@ from pydrake.multibody.tree import (
     ModelInstanceIndex,
     PlanarJoint,
     RigidBody,
+    WeldJoint,
 )
 from pydrake.systems.framework import Context, DiagramBuilder
 
-from coop_drake.plant.chain import find_base, scoped
-from coop_drake.plant.fixing import fix_joints
-from coop_drake.plant.grasps import Grasps, WeldedGrasps
-from coop_drake.plant.parsing import add_models, bodies_of, finalize, set_actuators
-from coop_drake.plant.planarity import check_masses, check_planar, object_frame, planar_pose
-from coop_drake.plant.read_once import add_copy, read_once
+from coop_drake.plant.chain import (
+    check_masses,
+    check_planar,
+    find_base,
+    fix_joints,
+    object_frame,
+    planar_pose,
+    scoped,
+)
+from coop_drake.plant.parsing import (
+    add_copy,
+    add_models,
+    bodies_of,
+    finalize,
+    joints_of,
+    read_once,
+    set_actuators,
+)
 from coop_drake.scenario import Assembly, RobotAssembly, Scenario, assemble
 from coop_drake.tree.pose import FloatArray, PlanarPose
+
+
+class Grasps(Protocol):
+    """The grasps of all robots, in the scenario's order."""
+
+    def wrenches(self, context: Context) -> FloatArray:
+        """Wrench on the object at every Ek in W, shape (N, 3) [N, N m].
+
+        Args:
+            context: The plant's, inside the diagram's, all inputs connected.
+        """
+        ...
+
+    def errors(self, context: Context) -> FloatArray:
+        """Distance between every robot's Ek and the same point of the object, shape (N,) [m]."""
+        ...
+
+
+class WeldedGrasps:
+    """Grasps that are joints of one tree: they are exact, and their wrenches are the joints' reactions.
+
+    Args:
+        plant: Finalized.
+        robots: The frames of every grasp; the object is its parent.
+    """
+
+    def __init__(self, plant: MultibodyPlant, robots: Sequence[RobotAssembly]) -> None:
+        self._reactions = plant.get_reaction_forces_output_port()
+        welds = [_weld(plant, robot) for robot in robots]
+        self._places = [place for place, _ in welds]
+        self._frames = [weld.frame_on_child() for _, weld in welds]
+
+    def wrenches(self, context: Context) -> FloatArray:
+        """As in :class:`Grasps`; the reaction on a weld's child acts on the robot, in the joint's frame."""
+        reactions = self._reactions.Eval(context)
+        rows = [
+            reactions[place].Rotate(frame.CalcRotationMatrixInWorld(context)).get_coeffs()
+            for place, frame in zip(self._places, self._frames, strict=True)
+        ]
+        return np.array([(-row[3], -row[4], -row[2]) for row in rows])
+
+    def errors(self, context: Context) -> FloatArray:
+        """As in :class:`Grasps`; zero, because the end effectors are bodies of the object's tree."""
+        return np.zeros(len(self._places))
+
+
+def _weld(plant: MultibodyPlant, robot: RobotAssembly) -> tuple[int, WeldJoint]:
+    """A robot's grasp, and its place in the plant's ``reaction_forces`` output."""
+    ends = {
+        int(GetScopedFrameByName(plant, frame).body().index())
+        for frame in (robot.gripper_frame, robot.object_frame)
+    }
+    return next(
+        (place, joint)
+        for place, joint in enumerate(joints_of(plant))
+        if joint.type_name() == "weld"
+        and {int(joint.parent_body().index()), int(joint.child_body().index())} == ends
+    )
+
+
+# The whole team as one tree rooted at the object: the plant that is simulated.
 
 
 @dataclass(frozen=True)

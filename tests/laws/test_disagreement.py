@@ -11,9 +11,8 @@ from coop_drake.laws.disagreement import disagreement_coupling
 from coop_drake.plant import build_team_plant
 from coop_drake.plant.component_tree import read_component_tree
 from coop_drake.plant.configuration import set_configuration
-from coop_drake.plant.disagreement import largest_disagreement, moved_bodies
 from coop_drake.plant.parsing import bodies_of
-from coop_drake.plant.run_masses import bodies_of_team, joint_inertias
+from coop_drake.plant.run_masses import bodies_of_team, joint_inertias, largest_disagreement, moved_bodies
 from coop_drake.scenario import load_scenario
 from tests.support.ring_team import PRISMATIC, REVOLUTE, ring_team
 

@@ -10,7 +10,7 @@ from pydrake.geometry import Box, Capsule, Convex, Cylinder, Ellipsoid, HalfSpac
 from pydrake.math import RigidTransform, RollPitchYaw
 from shapely import MultiPoint, points
 
-from coop_drake.plant.footprint import hull, project
+from coop_drake.plant.component_tree import hull, project
 from coop_drake.plant.placement import core
 from coop_drake.tree.pose import PlanarPose
 

@@ -12,9 +12,9 @@ from typer.testing import CliRunner
 from coop_drake.cli import app
 from coop_drake.errors import GeometryError
 from coop_drake.plant import planning_problem
-from coop_drake.plant.convex_parts import convex_parts
 from coop_drake.plant.placement import core
 from coop_drake.plant.polygon_body import (
+    convex_parts,
     planar_mass,
     polygon_body_files,
     write_polygon_body,

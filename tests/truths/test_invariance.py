@@ -11,7 +11,7 @@ from pydrake.math import RigidTransform, RotationMatrix
 from coop_drake.answers.problem import PlanningProblem
 from coop_drake.planning.channel import Channel
 from coop_drake.planning.search import find_channel
-from coop_drake.plant.planarity import planar_pose
+from coop_drake.plant.chain import planar_pose
 from coop_drake.tree.circles import nearest_turn
 from coop_drake.tree.component_tree import TreeJoint
 from coop_drake.verification.problem_match import same_angle
