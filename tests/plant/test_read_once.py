@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from pydrake.systems.framework import DiagramBuilder
 
-from coop_drake.plant import build_robot_plant, build_team_plant, processing, set_configuration
+from coop_drake.plant import build_robot_plant, build_team_plant, parsing, set_configuration
 from coop_drake.scenario import load_scenario
 from tests.support.edited_scenario import MODELS, shipped
 
@@ -16,13 +16,13 @@ from tests.support.edited_scenario import MODELS, shipped
 @pytest.fixture
 def readings(monkeypatch):
     """Receives an entry whenever Drake reads models."""
-    made, read = [], processing.ProcessModelDirectives
+    made, read = [], parsing.ProcessModelDirectives
 
     def counted(directives, parser):
         made.append(len(directives.directives))
         return read(directives, parser)
 
-    monkeypatch.setattr(processing, "ProcessModelDirectives", counted)
+    monkeypatch.setattr(parsing, "ProcessModelDirectives", counted)
     return made
 
 
