@@ -23,9 +23,9 @@ from coop_drake.campaign.measuring import record_of_log
 from coop_drake.campaign.records import RunRecord, table_of
 from coop_drake.campaign.variation import Run
 from coop_drake.compiled_loop import CompiledTransport, prepare, run
+from coop_drake.compiling import COMPILING
 from coop_drake.errors import PlanError
 from coop_drake.harmonic_maps import HarmonicMap
-from coop_drake.kernel_times import KERNEL_TIMES
 from coop_drake.simulation import simulate
 
 DEPLOYMENTS: dict[str, dict[str, Any]] = {
@@ -86,10 +86,10 @@ def _rows(team: str, label: str, _: Sequence[Row]) -> list[Row]:
     seconds = (process_time() - begun) / RUNS
     differences, drakes = dict.fromkeys(_COLUMNS, 0.0), 0.0
     for seed, outcome in enumerate(outcomes[:PAIRS]):
-        begun, compiling = process_time(), KERNEL_TIMES.cpu_seconds
+        begun, compiling = process_time(), COMPILING.cpu_seconds
         deployment = replace(transport.scenario.deployment, seed=seed)
         log = simulate(replace(transport.scenario, deployment=deployment), transport.plan, maps)
-        drakes += (process_time() - begun - KERNEL_TIMES.cpu_seconds + compiling) / PAIRS
+        drakes += (process_time() - begun - COMPILING.cpu_seconds + compiling) / PAIRS
         record = record_of_log(Run(0, 0, seed, {}), team, log, transport.plan, "")
         for column in _COLUMNS:
             difference = abs(getattr(outcome, column) - getattr(record, column))

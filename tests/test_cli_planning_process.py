@@ -8,10 +8,9 @@ import threading
 
 import pytest
 
-from coop_drake.cli.kernel_clock import kernel_clock
 from coop_drake.cli.planning_process import beside
+from coop_drake.compiling import COMPILING, kernel_clock
 from coop_drake.errors import PlanError, ProcessError, RefusalError
-from coop_drake.kernel_times import KERNEL_TIMES
 
 
 def nothing(*_):
@@ -35,16 +34,16 @@ def test_kernels_of_the_copy_count_and_are_named_here():
     compiled = []
 
     def work(_):
-        KERNEL_TIMES.announce("separated")
-        KERNEL_TIMES.cpu_seconds += 2.0
-        KERNEL_TIMES.wall_seconds += 3.0
+        COMPILING.announce("separated")
+        COMPILING.cpu_seconds += 2.0
+        COMPILING.wall_seconds += 3.0
 
-    before = KERNEL_TIMES.cpu_seconds, KERNEL_TIMES.wall_seconds
+    before = COMPILING.cpu_seconds, COMPILING.wall_seconds
     with kernel_clock(compiled.append) as clock:
         beside(work, nothing, nothing)
         assert (clock.cpu_seconds, clock.wall_seconds) == pytest.approx((2.0, 3.0))
     assert compiled == ["separated"]
-    KERNEL_TIMES.cpu_seconds, KERNEL_TIMES.wall_seconds = before
+    COMPILING.cpu_seconds, COMPILING.wall_seconds = before
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ import typer
 
 from coop_drake.cli import reporter as module
 from coop_drake.cli.reporter import reporting
-from coop_drake.kernel_times import KERNEL_TIMES
+from coop_drake.compiling import COMPILING
 
 
 @pytest.fixture
@@ -15,7 +15,8 @@ def clock(monkeypatch):
     """The time that the reporter reads [s]."""
     now = [0.0]
     monkeypatch.setattr(module, "perf_counter", lambda: now[0])
-    monkeypatch.setattr(KERNEL_TIMES, "functions", 40)
+    monkeypatch.setattr(COMPILING, "functions", 40)
+    monkeypatch.setattr(COMPILING, "names", set())
     return now
 
 
@@ -23,8 +24,8 @@ def _compile_one_each_second(clock, **options):
     with reporting(**options) as reporter, reporter.stage("planning"):
         for second in range(25):
             clock[0] = float(second)
-            KERNEL_TIMES.announce(f"function_{second}")
-            KERNEL_TIMES.announce("function_0")  # For other types: not counted twice.
+            COMPILING.announce(f"function_{second}")
+            COMPILING.announce("function_0")  # For other types: not counted twice.
 
 
 def test_without_a_terminal_lines_at_a_low_rate_say_how_many_functions_are_compiled(clock, capsys):
@@ -32,7 +33,7 @@ def test_without_a_terminal_lines_at_a_low_rate_say_how_many_functions_are_compi
         _compile_one_each_second(clock)
     lines = capsys.readouterr().out.splitlines()
     assert lines == [
-        f"Compiling function {count} of at most 40; later runs load them from the cache"
+        f"Compiled {count} of at most 40 functions; later runs load them from the cache"
         for count in (1, 11, 21)
     ]
 
@@ -41,8 +42,8 @@ def test_machines_get_the_lines_on_standard_error_and_the_quiet_none(clock, caps
     with pytest.raises(typer.Exit):
         _compile_one_each_second(clock, machine=True)
     out, err = capsys.readouterr()
-    assert "Compiling" not in out
-    assert err.count("Compiling function") == 3
+    assert "Compiled" not in out
+    assert err.count("Compiled") == 3
     with pytest.raises(typer.Exit):
         _compile_one_each_second(clock, quiet=True)
     assert capsys.readouterr() == ("", "")

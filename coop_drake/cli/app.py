@@ -40,7 +40,6 @@ from coop_drake.cli import (
     watch,
     why,
 )
-from coop_drake.cli.kernel_cache import keep_kernels_somewhere
 from coop_drake.cli.reporter import ExitCode, Reporter
 
 _PANELS: dict[str, tuple[ModuleType, ...]] = {
@@ -105,7 +104,6 @@ def main() -> None:
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, TextIOWrapper):  # A terminal in ASCII shows ? for what it does not have.
             stream.reconfigure(errors="replace")
-    keep_kernels_somewhere()
     try:
         code = app(arguments, standalone_mode=False)
         if code == ExitCode.INTERRUPTED and not Reporter.complained:  # before or after the command itself

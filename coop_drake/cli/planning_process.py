@@ -15,10 +15,9 @@ from multiprocessing.connection import Connection
 from threading import Thread
 from typing import TYPE_CHECKING, Any, NoReturn, TypeVar
 
-from coop_drake.cli.kernel_clock import kernel_clock
+from coop_drake.compiling import COMPILING, kernel_clock
 from coop_drake.errors import ProcessError, transferable
 from coop_drake.interrupts import uninterrupted
-from coop_drake.kernel_times import KERNEL_TIMES
 from coop_drake.progress import Progress
 
 if TYPE_CHECKING:
@@ -97,11 +96,11 @@ def _followed(copy: Copy, progress: Progress) -> Any:
         if kind == "progress":
             progress(*content)
         elif kind == "compiling":
-            KERNEL_TIMES.announce(*content)
+            COMPILING.announce(*content)
         else:
             ((result, wall_seconds, cpu_seconds),) = content
-            KERNEL_TIMES.wall_seconds += wall_seconds
-            KERNEL_TIMES.cpu_seconds += cpu_seconds
+            COMPILING.wall_seconds += wall_seconds
+            COMPILING.cpu_seconds += cpu_seconds
             return result
 
 
@@ -159,7 +158,7 @@ def _work(work: Callable[[Send], object], connection: Connection) -> NoReturn:
     def send(*message: object) -> None:
         connection.send(message)
 
-    KERNEL_TIMES.compiling = None  # Another thread may have held a lock that showing needs.
+    COMPILING.tell = None  # Another thread may have held a lock that showing needs.
     Thread(target=watch, daemon=True).start()
     try:
         try:

@@ -17,7 +17,7 @@ import typer
 from rich.console import Console
 from rich.markup import escape
 
-from coop_drake.cli.kernel_clock import kernel_clock
+from coop_drake.compiling import COMPILING, kernel_clock
 from coop_drake.errors import (
     CoopDrakeError,
     FieldError,
@@ -28,7 +28,6 @@ from coop_drake.errors import (
     StallError,
 )
 from coop_drake.extras import install_advice
-from coop_drake.kernel_times import KERNEL_TIMES
 from coop_drake.progress import Progress
 
 _SMALLEST_STEP = 0.002
@@ -79,7 +78,6 @@ class Reporter:
         self.facts: dict[str, Any] = {}
         self.code = ExitCode.DONE
         self._machine = machine
-        self._compiled: set[str] = set()
         self._compiled_said = -math.inf
         self._console = Console(stderr=machine, quiet=quiet, highlight=False)
         self._errors = Console(stderr=True, highlight=False)
@@ -120,14 +118,12 @@ class Reporter:
         self.facts[fact] = round(self.facts.get(fact, 0.0) + seconds, 4)
 
     def _compiling(self, advance: Progress, kernel: str) -> None:
-        """Say which of how many functions is compiled now: in the bar, or in a line every few seconds."""
-        self._compiled.add(kernel)
-        count = f"{len(self._compiled)} of at most {KERNEL_TIMES.functions}"
+        """Say how many functions are compiled: in the bar, or in a line every few seconds."""
         if self._moving:
-            advance(f"compiling function {count}, {kernel} (first run only)", 0.0)
+            advance(f"compiled {COMPILING.count} functions, {kernel} (first run only)", 0.0)
         elif perf_counter() - self._compiled_said >= _BETWEEN_LINES:
             self._compiled_said = perf_counter()
-            self.say(f"Compiling function {count}; later runs load them from the cache")
+            self.say(f"Compiled {COMPILING.count} functions; later runs load them from the cache")
 
     @contextmanager
     def _bar(self, name: str) -> Iterator[Progress]:

@@ -36,7 +36,7 @@ from coop_drake.systems.team_kernels import FusedTeam
 from coop_drake.tree.pose import FloatArray
 
 
-@compiled(whole_program=True)
+@compiled
 def run_loop(
     cells: LoopCells, team: FusedTeam, plant: LoopPlant, nominal: LoopNominal, departures: LoopDepartures,
     memory: LoopMemory,

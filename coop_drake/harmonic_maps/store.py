@@ -18,10 +18,9 @@ import numpy as np
 import shapely
 from shapely import Point, Polygon
 
-from coop_drake.compiled import MAKERS
 from coop_drake.files import write_atomically
 from coop_drake.harmonic_maps.harmonic_map import HarmonicMap, MapAccuracy, Solution
-from coop_drake.machine_code import processor_stamp
+from coop_drake.jit import compiler_settings
 
 _SUFFIX = ".map.npz"
 _DAMAGE = (OSError, ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile, zlib.error)
@@ -108,13 +107,13 @@ def _code() -> bytes:
     """Digest of everything that the numbers in a map depend on except domain, goal and tolerance."""
     digest = hashlib.sha256()
     here = Path(__file__).parent
-    compiling = [here.with_name(f"{name}.py") for name in MAKERS]
-    for path in sorted([*here.glob("*.py"), *here.with_name("geometry").glob("*.py"), *compiling]):
+    shapes, compiling = here.with_name("geometry"), here.with_name("jit.py")
+    for path in sorted([*here.glob("*.py"), *shapes.glob("*.py"), compiling]):
         digest.update(path.name.encode() + b"\0" + path.read_bytes())
     for name in ("numpy", "scipy", "numba", "llvmlite", "shapely"):
         digest.update(f"{name} {version(name)}".encode())
     # Compiled sums and BLAS use what the processor has, and what their settings say, which changes last bits.
-    digest.update(f"{platform.system()} {platform.machine()} {processor_stamp()}".encode())
+    digest.update(f"{platform.system()} {platform.machine()} {compiler_settings()}".encode())
     return digest.digest()
 
 
