@@ -8,7 +8,7 @@ import numpy as np
 
 from coop_drake.answers.budget import Budget
 from coop_drake.answers.plan import Plan
-from coop_drake.compiled import compiled
+from coop_drake.jit import compiled
 from coop_drake.laws.axis_table import FADING_TIME, LEAVING_TIME, axis_table, bounds_of, rest_jump, track_row
 from coop_drake.laws.hand_over import fading
 from coop_drake.laws.nominal_axes import carry_axes as carry_nominal

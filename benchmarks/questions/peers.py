@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from importlib.util import find_spec
 from itertools import pairwise
 from math import nan, pi, remainder
@@ -16,7 +17,6 @@ import shapely
 
 from benchmarks.questions.tree_kernels import rrt_connect
 from coop_drake.answers import PlanningProblem
-from coop_drake.compiled import prepared
 from coop_drake.planning.sampling.collision import grid_for_team, is_free
 from coop_drake.tree.component_tree import ConvexShape
 from coop_drake.tree.levers import configuration_scale
@@ -73,7 +73,7 @@ def prepared_check(problem: PlanningProblem) -> Callable[..., bool]:
     """
     team = problem.tree.arrays
     grid = grid_for_team(problem.workspace, team)
-    check = prepared(is_free, (team, grid), problem.start.astype(float), 0.0)
+    check = partial(is_free, team, grid)
     return lambda *values: check(np.array(values), 0.0)
 
 

@@ -15,9 +15,9 @@ from benchmarks.questions.floors import Random, RandomFloor, random_floor
 from benchmarks.questions.settings import QuestionSettings
 from benchmarks.questions.teams import RandomTeam, random_count, random_team
 from coop_drake.answers import PlanningProblem
-from coop_drake.compiled import compiled
 from coop_drake.errors import CoopDrakeError, ScenarioError
 from coop_drake.files import write_atomically
+from coop_drake.jit import compiled
 from coop_drake.planning.sampling.collision import bodies_apart, grid_for_team, is_free
 from coop_drake.plant import planning_problem
 from coop_drake.scenario import Goal, ObjectPose, Scenario, Start, Workspace, dump_scenario, load_scenario

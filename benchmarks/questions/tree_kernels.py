@@ -6,7 +6,7 @@ from math import pi
 
 import numpy as np
 
-from coop_drake.compiled import compiled
+from coop_drake.jit import compiled
 from coop_drake.planning.sampling.collision import ObstacleGrid, is_free
 from coop_drake.tree.pose import FloatArray, IntArray
 from coop_drake.tree.team_arrays import TeamArrays

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from coop_drake.compiled import compiled
+from coop_drake.jit import compiled
 from coop_drake.simulation.convex_distance import pair_apart, piece_to_walls
 from coop_drake.simulation.step_kernels import place_pieces
 from coop_drake.tree.pose import FloatArray
@@ -56,7 +56,7 @@ def clearance_room(size: int, team: TeamArrays) -> Clearances:
     return Clearances(z, np.zeros(2), walls, pairs, np.empty(team.vertices.shape), np.empty(team.discs.shape))
 
 
-@compiled
+@compiled(borrows=True)
 def travel(z: FloatArray, reach: FloatArray, last: Clearances) -> None:
     """Add the way to a configuration, shape (3 + n,) [m, rad]; ``reach`` is that of a ``LoopPlant``."""
     between = 0.0
@@ -70,7 +70,7 @@ def travel(z: FloatArray, reach: FloatArray, last: Clearances) -> None:
         last.z[i] = z[i]
 
 
-@compiled
+@compiled(borrows=True)
 def smallest_to_walls(
     z: FloatArray, team: TeamArrays, walls: FloatArray, last: Clearances, smallest: float
 ) -> float:
@@ -88,7 +88,7 @@ def smallest_to_walls(
     return smallest
 
 
-@compiled
+@compiled(borrows=True)
 def smallest_apart(z: FloatArray, team: TeamArrays, last: Clearances, smallest: float) -> float:
     """Return the smallest distance of two bodies that must not touch until now, given that before [m]."""
     placed = False

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from coop_drake.compiled import compiled
 from coop_drake.compiled_loop.arrays import LoopCells, LoopDepartures, LoopMemory, LoopNominal, LoopPlant
 from coop_drake.compiled_loop.motion import EARLY, MotionRoom, advance, motion_room
 from coop_drake.compiled_loop.robots import (
@@ -25,6 +24,7 @@ from coop_drake.compiled_loop.watching import (
     watch,
     watch_room,
 )
+from coop_drake.jit import compiled
 from coop_drake.laws.actuators import limit_efforts
 from coop_drake.laws.channels import carry_reports
 from coop_drake.laws.departure import quiet_margin
@@ -57,7 +57,7 @@ def run_loop(
     return figures
 
 
-@compiled
+@compiled(borrows=True)
 def _run_on(
     cells: LoopCells, team: FusedTeam, plant: LoopPlant, nominal: LoopNominal, departures: LoopDepartures,
     memory: LoopMemory, room: RobotRoom, motion: MotionRoom, seen: WatchRoom, figures: FloatArray,
@@ -76,7 +76,7 @@ def _run_on(
         watch(sample, cells, team, plant, nominal, departures, memory, seen, figures)
 
 
-@compiled
+@compiled(borrows=True)
 def update(
     cells: LoopCells, team: FusedTeam, nominal: LoopNominal, departures: LoopDepartures, room: RobotRoom,
     memory: LoopMemory, sample: int,
@@ -103,7 +103,7 @@ def update(
     _send(sample, departures, memory, room.arrivals)
 
 
-@compiled
+@compiled(borrows=True)
 def compute(
     k: int, sample: int, number: int, now: float, whole: bool, cells: LoopCells, team: FusedTeam,
     nominal: LoopNominal, departures: LoopDepartures, room: RobotRoom, memory: LoopMemory,
@@ -148,7 +148,7 @@ def compute(
     memory.governors[k, 1] += departures.times[0] * governed[1]
 
 
-@compiled
+@compiled(borrows=True)
 def _fail(
     k: int, sample: int, held: FloatArray, team: FusedTeam, departures: LoopDepartures, memory: LoopMemory
 ) -> None:
@@ -167,7 +167,7 @@ def _fail(
             memory.efforts[0, i] = held[i] if motors == 1.0 else 0.0
 
 
-@compiled
+@compiled(borrows=True)
 def _lead_on(
     sample: int, cell: int, law: FloatArray, cells: LoopCells, nominal: LoopNominal,
     departures: LoopDepartures, memory: LoopMemory,
@@ -189,7 +189,7 @@ def _lead_on(
         carry_axes(now_axes, law, period, nominal.axis_gains[2], later_axes)
 
 
-@compiled
+@compiled(borrows=True)
 def _send(sample: int, departures: LoopDepartures, memory: LoopMemory, arrivals: FloatArray) -> None:
     """Carry every robot's channel of reports over a period; ``arrivals`` is room for one."""
     loss, repeat = departures.probabilities[2], departures.probabilities[3]

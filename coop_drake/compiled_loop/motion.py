@@ -6,8 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from coop_drake.compiled import compiled
 from coop_drake.compiled_loop.arrays import LoopDepartures, LoopMemory, LoopPlant
+from coop_drake.jit import compiled
 from coop_drake.laws.actuators import lag_behind
 from coop_drake.laws.friction import base_friction
 from coop_drake.laws.sticking import StickingRoom, stick, sticking_room
@@ -60,7 +60,7 @@ def motion_room(robots: int, plant: LoopPlant) -> MotionRoom:
     )  # fmt: skip
 
 
-@compiled
+@compiled(borrows=True)
 def advance(
     sample: int, team: FusedTeam, plant: LoopPlant, departures: LoopDepartures, memory: LoopMemory,
     room: MotionRoom,
@@ -105,14 +105,14 @@ def advance(
         memory.state[i] += change[i]
 
 
-@compiled
+@compiled(borrows=True)
 def _within(times: FloatArray, sample: int, period: float) -> bool:
     """Whether a period begins in an interval of time [s]."""
     early = EARLY * period
     return bool(times[0] - early <= sample * period < times[1] - early)
 
 
-@compiled
+@compiled(borrows=True)
 def _drive(
     sample: int, time: float, state: FloatArray, team: FusedTeam, plant: LoopPlant,
     departures: LoopDepartures, memory: LoopMemory, room: MotionRoom,
@@ -151,7 +151,7 @@ def _drive(
                 wrenches[int(row[0]), i] += row[1 + i]
 
 
-@compiled
+@compiled(borrows=True)
 def _add_friction(
     state: FloatArray, team: FusedTeam, departures: LoopDepartures, wrenches: FloatArray, robot: FloatArray
 ) -> None:

@@ -6,8 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from coop_drake.compiled import compiled
 from coop_drake.compiled_loop.arrays import LoopCells, LoopDepartures, LoopMemory, LoopNominal
+from coop_drake.jit import compiled
 from coop_drake.laws.arrival import arrival_margin
 from coop_drake.laws.axis_table import bounds_of, track_axes, write_jumps
 from coop_drake.laws.departure import alarm_at, axis_level, largest_departure
@@ -75,7 +75,7 @@ def robot_room(memory: LoopMemory) -> RobotRoom:
     )  # fmt: skip
 
 
-@compiled
+@compiled(borrows=True)
 def heard_cell(
     k: int, sample: int, now: float, departures: LoopDepartures, memory: LoopMemory
 ) -> tuple[int, float]:
@@ -95,7 +95,7 @@ def heard_cell(
     return int(current[0]), now - (current[1] - departures.hearing[0, k])
 
 
-@compiled
+@compiled(borrows=True)
 def lead(
     k: int, sample: int, cell: int, time: float, cells: LoopCells, team: FusedTeam, nominal: LoopNominal,
     departures: LoopDepartures, memory: LoopMemory, room: RobotRoom,
@@ -129,7 +129,7 @@ def lead(
         room.told[ENERGY] = govern(cells.rows[cell], edges, flat, field, time, seen, p_G, governed)
 
 
-@compiled
+@compiled(borrows=True)
 def command(
     k: int, linear: FloatArray, axes: FloatArray, seen: FloatArray, robot: FloatArray, team: FusedTeam,
     efforts: FloatArray, told: FloatArray,
@@ -153,7 +153,7 @@ def command(
     robot_effort(chain, robot, wanted, axes, efforts[own : own + 2 + axes.size])
 
 
-@compiled
+@compiled(borrows=True)
 def follow_axes(
     k: int, sample: int, cell: int, time: float, cells: LoopCells, team: FusedTeam, nominal: LoopNominal,
     departures: LoopDepartures, memory: LoopMemory, room: RobotRoom,
@@ -208,7 +208,7 @@ def follow_axes(
     return 1
 
 
-@compiled
+@compiled(borrows=True)
 def _place(
     axes: FloatArray, mounting: FloatArray, seen: FloatArray, robot: FloatArray, led: FloatArray,
     led_robot: FloatArray,
@@ -268,7 +268,7 @@ def report(
     )  # fmt: skip
 
 
-@compiled
+@compiled(borrows=True)
 def judge(
     k: int, sample: int, now: float, team: FusedTeam, cells: LoopCells, nominal: LoopNominal,
     departures: LoopDepartures, memory: LoopMemory, room: RobotRoom, robot: FloatArray,
@@ -310,7 +310,7 @@ def judge(
         alarms[3] = now
 
 
-@compiled
+@compiled(borrows=True)
 def _report_arrival(
     k: int, sample: int, seen: FloatArray, robot: FloatArray, cells: LoopCells, nominal: LoopNominal,
     memory: LoopMemory, begin: int,
@@ -327,7 +327,7 @@ def _report_arrival(
     return robot_arrived(table, cells.goal, cells.tolerance, axes_led, seen, robot, led, arrival)
 
 
-@compiled
+@compiled(borrows=True)
 def remember_switch(
     k: int, cell: int, time: float, seen: FloatArray, robot: FloatArray, cells: LoopCells,
     memory: LoopMemory, begin: int,

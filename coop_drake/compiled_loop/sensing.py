@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from coop_drake.compiled import compiled
 from coop_drake.compiled_loop.arrays import LoopDepartures, LoopMemory
+from coop_drake.jit import compiled
 from coop_drake.laws.channels import NOTHING, carry_measurements
 from coop_drake.laws.measurement_errors import shift_back, write_errors
 from coop_drake.laws.random_draws import uniform_pair
@@ -16,7 +16,7 @@ LOST_POSE, POSE_NOISE, STATE_NOISE = 1, 5, 6
 """Uses of seeds: losses of measured poses, those of measured states being the next one, and noise of both."""
 
 
-@compiled
+@compiled(borrows=True)
 def measure(
     sample: int, number: int, team: FusedTeam, departures: LoopDepartures, memory: LoopMemory,
     room: FloatArray,
@@ -50,7 +50,7 @@ def measure(
         _err(departures.seeds[k, STATE_NOISE], number, sizes, robot, room)
 
 
-@compiled
+@compiled(borrows=True)
 def _shift(sample: int, first: int, share: float, values: FloatArray, exact: FloatArray) -> None:
     """Show what a wrong clock measures, and keep what there is from ``first`` on; see ``shift_back``."""
     now, before = exact[sample % 2], exact[(sample + 1) % 2]
@@ -61,7 +61,7 @@ def _shift(sample: int, first: int, share: float, values: FloatArray, exact: Flo
     shift_back(values, before[first : first + values.size], share)
 
 
-@compiled
+@compiled(borrows=True)
 def _err(seed: int, sample: int, sizes: FloatArray, values: FloatArray, room: FloatArray) -> None:
     """Add the errors of a measurement, unless there are none."""
     largest = 0.0
@@ -74,7 +74,7 @@ def _err(seed: int, sample: int, sizes: FloatArray, values: FloatArray, room: Fl
             values[i] += errors[i]
 
 
-@compiled
+@compiled(borrows=True)
 def receive(
     k: int, sample: int, number: int, team: FusedTeam, departures: LoopDepartures, memory: LoopMemory,
     pose: FloatArray, robot: FloatArray,
@@ -104,7 +104,7 @@ def receive(
             _pass(departures.seeds[k, LOST_POSE + kind], number, departures, memory.lines[k, kind], values)
 
 
-@compiled
+@compiled(borrows=True)
 def _fill(line: FloatArray, values: FloatArray) -> None:
     """Let a line hold the first values that are measured."""
     for row in range(line.shape[0]):

@@ -7,7 +7,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from coop_drake.compiled import compiled
 from coop_drake.compiled_loop.arrays import LoopCells, LoopDepartures, LoopMemory, LoopNominal, LoopPlant
 from coop_drake.compiled_loop.clearances import (
     ROUNDING,
@@ -19,6 +18,7 @@ from coop_drake.compiled_loop.clearances import (
 )
 from coop_drake.compiled_loop.robots import heard_cell
 from coop_drake.geometry.boundary import signed_distance
+from coop_drake.jit import compiled
 from coop_drake.laws.axis_table import bounds_of
 from coop_drake.systems.team_kernels import FusedTeam
 from coop_drake.tree.pose import FloatArray
@@ -108,14 +108,14 @@ def begin_figures() -> FloatArray:
     return figures
 
 
-@compiled
+@compiled(borrows=True)
 def end(figures: FloatArray, how: int, value: float, place: int = -1) -> None:
     """Write how a run ended, unless it has ended already."""
     if figures[ENDED] == RUNS:
         figures[ENDED], figures[VALUE], figures[PLACE] = how, value, place
 
 
-@compiled
+@compiled(borrows=True)
 def watch(
     sample: int, cells: LoopCells, team: FusedTeam, plant: LoopPlant, nominal: LoopNominal,
     departures: LoopDepartures, memory: LoopMemory, room: WatchRoom, figures: FloatArray,
@@ -153,7 +153,7 @@ def watch(
         end(figures, LATE, time)
 
 
-@compiled
+@compiled(borrows=True)
 def _watch_cell(
     sample: int, cell: int, cells: LoopCells, plant: LoopPlant, nominal: LoopNominal,
     departures: LoopDepartures, memory: LoopMemory, room: WatchRoom, figures: FloatArray,
@@ -181,7 +181,7 @@ def _watch_cell(
     _watch_region(cell, z[0], z[1], cells, room.region, figures)
 
 
-@compiled
+@compiled(borrows=True)
 def _watch_region(
     cell: int, x: float, y: float, cells: LoopCells, last: FloatArray, figures: FloatArray
 ) -> None:
@@ -199,7 +199,7 @@ def _watch_region(
         end(figures, OUT_OF_REGION, inside)
 
 
-@compiled
+@compiled(borrows=True)
 def watch_distances(z: FloatArray, plant: LoopPlant, last: Clearances, figures: FloatArray) -> None:
     """Measure clearances, and end the run where one is not positive."""
     travel(z, plant.reach, last)
@@ -211,7 +211,7 @@ def watch_distances(z: FloatArray, plant: LoopPlant, last: Clearances, figures: 
         end(figures, AT_BODY, figures[BODY])
 
 
-@compiled
+@compiled(borrows=True)
 def _watch_departures(
     sample: int, cell: int, z: FloatArray, team: FusedTeam, plant: LoopPlant, nominal: LoopNominal,
     memory: LoopMemory, figures: FloatArray,
@@ -231,14 +231,14 @@ def _watch_departures(
             _use(abs(rate - axes[1, row]) / nominal.distances[2, cell, i], figures)
 
 
-@compiled
+@compiled(borrows=True)
 def _use(share: float, figures: FloatArray) -> None:
     """Note which share was used of what the plan's budget states."""
     if isnan(figures[SHARE]) or share > figures[SHARE]:
         figures[SHARE] = share
 
 
-@compiled
+@compiled(borrows=True)
 def _watch_efforts(team: FusedTeam, memory: LoopMemory, before: FloatArray, figures: FloatArray) -> None:
     """Measure forces and torques of the bases, and the largest effort of a joint.
 
@@ -260,7 +260,7 @@ def _watch_efforts(team: FusedTeam, memory: LoopMemory, before: FloatArray, figu
             figures[EFFORT] = max(figures[EFFORT], abs(memory.efforts[1, own + 3 + i]))
 
 
-@compiled
+@compiled(borrows=True)
 def _watch_rotation(rate: float, before: FloatArray, figures: FloatArray) -> None:
     """Measure the largest change of the object's rate of rotation [rad/s] from sample to sample."""
     turn = abs(rate - before[-1])
@@ -269,7 +269,7 @@ def _watch_rotation(rate: float, before: FloatArray, figures: FloatArray) -> Non
     before[-1] = rate
 
 
-@compiled
+@compiled(borrows=True)
 def _watch_alarms(nominal: LoopNominal, memory: LoopMemory, figures: FloatArray) -> None:
     """End the run where a robot asks for a hold: this loop does not know holds."""
     for k in range(memory.alarms.shape[0]):
@@ -280,7 +280,7 @@ def _watch_alarms(nominal: LoopNominal, memory: LoopMemory, figures: FloatArray)
             end(figures, HELD, memory.alarms[k, 1], int(memory.alarms[k, 2]))
 
 
-@compiled
+@compiled(borrows=True)
 def left_by_all(cell: int, memory: LoopMemory) -> bool:
     """Whether the reports heard say that all robots are ready to leave a cell, as the cell planner judges."""
     for k in range(memory.channels.shape[0]):
@@ -289,7 +289,7 @@ def left_by_all(cell: int, memory: LoopMemory) -> bool:
     return True
 
 
-@compiled
+@compiled(borrows=True)
 def _share_of_tolerance(z: FloatArray, cells: LoopCells, team: FusedTeam) -> float:
     """Return how far object and joints are off the goal over what is tolerated, whatever was measured [-]."""
     largest = 0.0

@@ -10,9 +10,9 @@ import shapely
 from numpy.typing import ArrayLike, NDArray
 from shapely import Polygon
 
-from coop_drake.compiled import compiled
 from coop_drake.errors import GeometryError
 from coop_drake.geometry.distances import ray_crosses, segments_cross, squared_distance
+from coop_drake.jit import compiled
 from coop_drake.tree.pose import FloatArray
 
 
@@ -25,7 +25,7 @@ def edges_of(polygon: Polygon) -> FloatArray:
     return np.vstack([np.hstack([ring[:-1], ring[1:]]) for ring in rings])
 
 
-@compiled
+@compiled(borrows=True)
 def signed_distance(edges: FloatArray, x: float, y: float) -> float:
     """Distance of a point to the nearest edge [m], positive inside: a ray from there crosses an odd number.
 
@@ -41,7 +41,7 @@ def signed_distance(edges: FloatArray, x: float, y: float) -> float:
     return sqrt(nearest) if inside else -sqrt(nearest)
 
 
-@compiled
+@compiled(borrows=True)
 def _segment_clearance(edges: FloatArray, ax: float, ay: float, bx: float, by: float) -> float:
     """Distance of the segment a-b from the nearest edge [m], zero where they cross."""
     nearest = np.inf

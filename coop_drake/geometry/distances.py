@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from math import hypot
 
-from coop_drake.compiled import compiled
+from coop_drake.jit import compiled
 from coop_drake.tree.pose import FloatArray
 
 
@@ -61,7 +61,7 @@ def segments_cross(
     return (twice_area(cx, cy, dx, dy, ax, ay) > 0.0) != (twice_area(cx, cy, dx, dy, bx, by) > 0.0)
 
 
-@compiled
+@compiled(borrows=True)
 def meets_ring(
     vertices: FloatArray, first: int, last: int, ax: float, ay: float, bx: float, by: float
 ) -> bool:
@@ -93,7 +93,7 @@ def meets_ring(
     return True
 
 
-@compiled
+@compiled(borrows=True)
 def squared_ring_distance(
     vertices: FloatArray, first: int, last: int, ax: float, ay: float, bx: float, by: float, most: float
 ) -> float:
@@ -112,7 +112,7 @@ def squared_ring_distance(
     return best
 
 
-@compiled
+@compiled(borrows=True)
 def ring_holds(vertices: FloatArray, first: int, last: int, x: float, y: float) -> bool:
     """Whether a ring of three or more vertices encloses a point; see ``meets_ring`` for the arguments."""
     if last - first < 3:
@@ -125,7 +125,7 @@ def ring_holds(vertices: FloatArray, first: int, last: int, x: float, y: float) 
     return True
 
 
-@compiled
+@compiled(borrows=True)
 def separated(first: FloatArray, second: FloatArray, gap: float = 0.0) -> bool:
     """Whether the line of some edge keeps two convex polygons further apart than ``gap`` [m].
 
@@ -134,7 +134,7 @@ def separated(first: FloatArray, second: FloatArray, gap: float = 0.0) -> bool:
     return _edge_separates(first, second, gap) or _edge_separates(second, first, gap)
 
 
-@compiled
+@compiled(borrows=True)
 def _edge_separates(first: FloatArray, second: FloatArray, gap: float) -> bool:
     for i in range(len(first)):
         k = i + 1 if i + 1 < len(first) else 0

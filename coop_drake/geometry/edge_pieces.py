@@ -7,8 +7,8 @@ from math import sqrt
 import numpy as np
 from numpy.typing import NDArray
 
-from coop_drake.compiled import compiled
 from coop_drake.geometry.distances import squared_distance
+from coop_drake.jit import compiled
 from coop_drake.tree.pose import FloatArray
 
 IndexArray = NDArray[np.intp]
@@ -47,7 +47,7 @@ def cut_edges(
     return np.array(starts[1:]), np.array(owners[1:])
 
 
-@compiled
+@compiled(borrows=True)
 def _gap(edges: FloatArray, k: int, x: float, y: float) -> float:
     """Distance of a point of edge k to the nearest edge that does not touch it [m]."""
     gap = np.inf

@@ -12,11 +12,11 @@ import shapely
 from numpy.typing import ArrayLike
 from shapely import LineString, Polygon
 
-from coop_drake.compiled import compiled
 from coop_drake.errors import GeometryError
 from coop_drake.geometry.boundary import BoundaryDistance, edges_of
 from coop_drake.geometry.edge_pieces import IndexArray, cut_edges
 from coop_drake.geometry.triangles import triangulate
+from coop_drake.jit import compiled
 from coop_drake.tree.pose import FloatArray, IntArray
 
 # The medial graph of a polygon: the Voronoi graph of samples of its boundary, as far as it lies inside.
@@ -114,7 +114,7 @@ def _joining(pairs: IntArray, clearance: FloatArray, count: int, start: int, end
     return 0
 
 
-@compiled
+@compiled(borrows=True)
 def _root(joined_to: IntArray, node: int) -> int:
     """The node that stands for all that a node is joined to; paths to it become shorter."""
     while joined_to[node] != node:

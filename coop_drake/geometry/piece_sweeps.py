@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from math import cos, sin
 
-from coop_drake.compiled import compiled
 from coop_drake.geometry.sweep_kernels import disc_turn, grown, over_prismatic, over_revolute
+from coop_drake.jit import compiled
 from coop_drake.tree.pose import FloatArray
 from coop_drake.tree.team_arrays import TeamArrays, moved
 
@@ -40,7 +40,7 @@ def over_joint(
     return ring
 
 
-@compiled
+@compiled(borrows=True)
 def joint_width(team: TeamArrays, link: int, lower: FloatArray, upper: FloatArray) -> float:
     """Width of the interval of the joint that moves a component [rad or m]; others as in ``over_joint``."""
     axis = team.links[link, 1] - 2

@@ -9,10 +9,10 @@ import shapely
 from numpy.typing import NDArray
 from shapely import Polygon
 
-from coop_drake.compiled import compiled
 from coop_drake.geometry.distances import segments_cross, squared_distance, twice_area
 from coop_drake.geometry.edge_pieces import IndexArray
 from coop_drake.geometry.parts import corners_of
+from coop_drake.jit import compiled
 from coop_drake.tree.pose import FloatArray
 
 DROP, PROLONG = 1, 2
@@ -68,7 +68,7 @@ def sharpest_angle(polygon: Polygon) -> float:
     return float(min(angles.min(), 2.0 * np.pi - angles.max()))
 
 
-@compiled
+@compiled(borrows=True)
 def _drop_depth(points: FloatArray, a: int, b: int, c: int, slack: float) -> float:
     """Depth that leaving out b cuts off; infinite where b is reflex by more than the slack."""
     ax, ay, bx, by = points[a, 0], points[a, 1], points[b, 0], points[b, 1]
@@ -77,7 +77,7 @@ def _drop_depth(points: FloatArray, a: int, b: int, c: int, slack: float) -> flo
     return depth if twice_area(ax, ay, bx, by, cx, cy) >= 0.0 or depth <= slack else inf
 
 
-@compiled
+@compiled(borrows=True)
 def _prolong(points: FloatArray, a: int, b: int, c: int, d: int) -> tuple[float, float, float]:
     """Where a b and d c, prolonged, meet beyond the reflex edge b c, and how far from it: (x, y, depth)."""
     ux, uy = points[b, 0] - points[a, 0], points[b, 1] - points[a, 1]
@@ -94,7 +94,7 @@ def _prolong(points: FloatArray, a: int, b: int, c: int, d: int) -> tuple[float,
     return x, y, sqrt(squared)
 
 
-@compiled
+@compiled(borrows=True)
 def _is_free(
     points: FloatArray,
     alive: NDArray[np.bool_],
@@ -130,7 +130,7 @@ def _is_free(
     return True
 
 
-@compiled
+@compiled(borrows=True)
 def _best_step(
     points: FloatArray, around: tuple[int, int, int, int], error: FloatArray, tolerance: float, slack: float
 ) -> tuple[float, int]:

@@ -6,9 +6,9 @@ from math import cos, hypot, sin
 
 import numpy as np
 
-from coop_drake.compiled import compiled
 from coop_drake.geometry.distances import squared_distance
 from coop_drake.geometry.sweep_kernels import edge_directions, support
+from coop_drake.jit import compiled
 from coop_drake.tree.pose import FloatArray
 
 _BEYOND = 1e-3
@@ -45,7 +45,7 @@ def convex_hull(points: FloatArray) -> FloatArray:
     return corners
 
 
-@compiled
+@compiled(borrows=True)
 def _nearer(x: float, y: float, wall: FloatArray, radius: float) -> bool:
     near: bool = squared_distance(x, y, wall[0], wall[1], wall[2], wall[3]) < radius * radius
     return near

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from coop_drake.compiled import compiled
+from coop_drake.jit import compiled
 from coop_drake.tree.pose import FloatArray, IntArray
 
 _NEEDLE = 1e-12
@@ -76,7 +76,7 @@ def _furthest(points: FloatArray, first: IntArray, convex: FloatArray) -> IntArr
     return furthest
 
 
-@compiled
+@compiled(borrows=True)
 def _width(ring: FloatArray, axis: int) -> float:
     """Width of a ring, shape (n, 2), along the first (0) or second (1) coordinate [m]."""
     low, high = ring[0, axis], ring[0, axis]
@@ -86,7 +86,7 @@ def _width(ring: FloatArray, axis: int) -> float:
     return width
 
 
-@compiled
+@compiled(borrows=True)
 def _bends_in(points: FloatArray, before: int, here: int, after: int) -> bool:
     """Whether a corner of the outline points into the floor, or is a needle, which blocks no more."""
     ax, ay = points[here, 0] - points[before, 0], points[here, 1] - points[before, 1]

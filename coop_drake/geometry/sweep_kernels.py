@@ -9,8 +9,8 @@ from math import atan2, ceil, cos, floor, hypot, pi, sin, sqrt
 
 import numpy as np
 
-from coop_drake.compiled import compiled
 from coop_drake.geometry.convex import SLACK
+from coop_drake.jit import compiled
 from coop_drake.tree.pose import FloatArray
 
 _TURN = 2.0 * pi
@@ -47,7 +47,7 @@ def disc_turn(half_width: float) -> float:
     return min(0.6, max(0.05, 0.9 * sqrt(half_width))) if half_width > 0.0 else 0.6
 
 
-@compiled
+@compiled(borrows=True)
 def sort(values: FloatArray) -> None:
     """Sort a short array in place by insertion; numpy's sort takes longer to compile, and as long to run."""
     for i in range(1, len(values)):
@@ -153,7 +153,7 @@ def edge_directions(vertices: FloatArray) -> FloatArray:
     return angles
 
 
-@compiled
+@compiled(borrows=True)
 def _furthest(vertices: FloatArray, i: int) -> bool:
     """Whether vertex i of a ring is no nearer to the origin than the points next to it on its two edges."""
     after = i + 1 if i + 1 < len(vertices) else 0

@@ -14,7 +14,6 @@ from shapely import LineString, Point, Polygon
 from shapely.geometry.base import BaseGeometry
 from shapely.ops import substring
 
-from coop_drake.compiled import compiled
 from coop_drake.errors import GeometryError
 from coop_drake.geometry.boundary import BoundaryDistance, signed_distance
 from coop_drake.geometry.edge_pieces import IndexArray
@@ -22,6 +21,7 @@ from coop_drake.geometry.parts import component_at
 from coop_drake.geometry.passage import PassageFinder
 from coop_drake.geometry.simplify import simplify_inward
 from coop_drake.geometry.triangles import Triangles, triangulate
+from coop_drake.jit import compiled
 from coop_drake.tree.pose import FloatArray
 
 # Slits from the holes of a polygon to its outer ring: without holes a field stands still nowhere.

@@ -17,7 +17,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from coop_drake.compiled import compiled
 from coop_drake.harmonic_maps.evaluate import (
     CORNER_INDEX,
     CORNERS,
@@ -57,6 +56,7 @@ from coop_drake.harmonic_maps.panels import (
     place_nodes,
 )
 from coop_drake.harmonic_maps.solve import CLOSE, Density, legendre_moments
+from coop_drake.jit import compiled
 from coop_drake.tree.pose import ComplexArray, FloatArray, IntArray
 
 _REACH = 2.8
@@ -428,7 +428,7 @@ def _sort_out(
     return first, kept[:end], gain
 
 
-@compiled(reassociate=True)
+@compiled(reassociate=True, borrows=True)
 def _gain(m: FlatMap, near: IntArray, first: int, last: int, x: float, y: float, radius: float) -> int:
     """How many of the sources near a box a division may remove: those that are shorter than the box.
 
@@ -449,7 +449,7 @@ def _gain(m: FlatMap, near: IntArray, first: int, last: int, x: float, y: float,
     return gain
 
 
-@compiled(reassociate=True)
+@compiled(reassociate=True, borrows=True)
 def _expand(nodes: FloatArray, count: int, radius: float, series: FloatArray, box: int) -> None:
     """Add nodes to the series of a box, in units of its radius: real and imaginary parts for u, then for v.
 
@@ -479,7 +479,7 @@ def _expand(nodes: FloatArray, count: int, radius: float, series: FloatArray, bo
         series[box, degree, 3] += d
 
 
-@compiled(reassociate=True)
+@compiled(reassociate=True, borrows=True)
 def _shift(series: FloatArray, shifts: FloatArray) -> None:
     """Shift series, four for each box, to its quarters, whose centres are ``shifts`` (4, 2) radii away."""
     n = series.shape[1]

@@ -10,13 +10,13 @@ import shapely
 from numpy.typing import ArrayLike, NDArray
 from shapely import Point
 
-from coop_drake.compiled import compiled
 from coop_drake.errors import FieldError
 from coop_drake.geometry.boundary import edges_of
 from coop_drake.geometry.parts import extent_of
 from coop_drake.harmonic_maps.evaluate import FlatMap, evaluate_one, is_inside, nearest_on_walls
 from coop_drake.harmonic_maps.harmonic_map import HarmonicMap
 from coop_drake.harmonic_maps.outline import as_points
+from coop_drake.jit import compiled
 from coop_drake.tree.pose import FloatArray
 
 _STRAIGHT = 1e-6
@@ -102,7 +102,7 @@ class VelocityField:
         return self._map, self._field
 
 
-@compiled(reassociate=True)
+@compiled(reassociate=True, borrows=True)
 def velocity_in_field(flat: FlatMap, field: FloatArray, x: float, y: float) -> tuple[float, float]:
     """Velocity at a point of W [m], eq. (13) [m/s].
 

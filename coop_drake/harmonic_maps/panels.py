@@ -16,9 +16,9 @@ from math import ceil, cos, log, log1p, pi, sin
 import numpy as np
 from numpy.polynomial import legendre
 
-from coop_drake.compiled import compiled
 from coop_drake.geometry.distances import squared_distance
 from coop_drake.harmonic_maps.outline import Outline
+from coop_drake.jit import compiled
 from coop_drake.tree.pose import ComplexArray, FloatArray, IntArray
 
 _MAX_ANGLE = np.pi / 3
@@ -94,7 +94,7 @@ def point_distance(px: float, py: float, ax: float, ay: float, bx: float, by: fl
     return float(np.sqrt(squared_distance(px, py, ax, ay, bx, by)))
 
 
-@compiled(reassociate=True)
+@compiled(reassociate=True, borrows=True)
 def segment_distance(p: FloatArray, q: FloatArray) -> float:
     """Distance of two segments (x0, y0, x1, y1) that do not cross [m]."""
     return min(

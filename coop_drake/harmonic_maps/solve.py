@@ -32,9 +32,9 @@ import scipy  # It imports its parts when they are first used: maps from the cac
 from numpy.typing import NDArray
 from threadpoolctl import ThreadpoolController  # type: ignore[import-untyped]
 
-from coop_drake.compiled import compiled
 from coop_drake.harmonic_maps.outline import Outline
 from coop_drake.harmonic_maps.panels import Nodes, Panels, corner_operator, legendre_transform, place_nodes
+from coop_drake.jit import compiled
 from coop_drake.tree.pose import ComplexArray, FloatArray, IntArray
 
 CLOSE = 4.3
@@ -227,7 +227,7 @@ def _mark_near(
     return sources, targets
 
 
-@compiled(reassociate=True)
+@compiled(reassociate=True, borrows=True)
 def _find_near(
     target: ComplexArray, target_edge: IntArray, segments: ComplexArray, edge: IntArray,
     start: IntArray, found: IntArray,
@@ -268,7 +268,7 @@ def _near_weights(
     return weights
 
 
-@compiled(reassociate=True)
+@compiled(reassociate=True, borrows=True)
 def legendre_moments(zeta: complex, out: FloatArray) -> None:
     """1/pi times the imaginary part of the integral of P_k(x) / (x - zeta) over [-1, 1], k from 0."""
     turn = np.arctan2(zeta.imag, zeta.real + 1.0) - np.arctan2(zeta.imag, zeta.real - 1.0)

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from math import copysign, exp, hypot, inf
 
-from coop_drake.compiled import compiled
+from coop_drake.jit import compiled
 from coop_drake.tree.pose import FloatArray
 
 
-@compiled
+@compiled(borrows=True)
 def limit_efforts(limits: FloatArray, efforts: FloatArray) -> None:
     """Cut the efforts of one robot to what its actuators can give; a base's force keeps its direction.
 
@@ -28,7 +28,7 @@ def limit_efforts(limits: FloatArray, efforts: FloatArray) -> None:
         efforts[1 + i] = min(max(efforts[1 + i], -limits[i]), limits[i])
 
 
-@compiled
+@compiled(borrows=True)
 def lag_behind(lag: float, elapsed: float, held: FloatArray, before: FloatArray, given: FloatArray) -> None:
     """Write the efforts of actuators that are first-order low passes: y = u + exp(-t / T) (y_0 - u).
 

@@ -17,7 +17,7 @@ from __future__ import annotations
 from math import hypot, inf, isfinite, sqrt
 from typing import NamedTuple
 
-from coop_drake.compiled import compiled
+from coop_drake.jit import compiled
 from coop_drake.laws.readiness import EROSION, RATE_TOLERANCE, SPEED_TOLERANCE
 from coop_drake.laws.sampling import whole_periods
 from coop_drake.tree.pose import FloatArray
@@ -61,7 +61,7 @@ def mean_samples(period: float) -> int:
     return max(2, whole_periods(MEAN_TIME, period))
 
 
-@compiled
+@compiled(borrows=True)
 def arrival_margin(
     place: FloatArray, tolerances: FloatArray, errors: FloatArray, recent: FloatArray, newest: int
 ) -> float:
@@ -98,7 +98,7 @@ def arrival_margin(
     return margin
 
 
-@compiled
+@compiled(borrows=True)
 def _statistics(recent: FloatArray, newest: int, column: int) -> tuple[float, float, float, float]:
     """Return m_1, m_0, s^2 and d^2 of one column."""
     rows = recent.shape[0]

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from coop_drake.compiled import compiled
+from coop_drake.jit import compiled
 from coop_drake.laws.funnels import Funnel, axis_bounds
 from coop_drake.laws.gains import TransitionGains
 from coop_drake.laws.hand_over import fading
@@ -73,7 +73,7 @@ def axis_table(funnel: Funnel, gains: TransitionGains) -> FloatArray:
     return table
 
 
-@compiled
+@compiled(borrows=True)
 def write_row(
     row: FloatArray,
     intervals: tuple[float, float, float, float],
@@ -101,7 +101,7 @@ def write_row(
     row[LEAVING_TIME], row[REST_REACH], row[REST_RATE] = row[FADING_TIME], 0.0, 0.0
 
 
-@compiled
+@compiled(borrows=True)
 def bounds_of(row: FloatArray, time: float) -> tuple[float, float, float, float, float, float]:
     """Return ``axis_bounds`` of one axis from its row, ``time`` [s] after the cell was entered."""
     return axis_bounds(
@@ -110,7 +110,7 @@ def bounds_of(row: FloatArray, time: float) -> tuple[float, float, float, float,
     )  # fmt: skip
 
 
-@compiled
+@compiled(borrows=True)
 def law_at(
     row: FloatArray, time: float, pace: float, pace_rate: float
 ) -> tuple[tuple[float, float, float, float, float, float], tuple[float, float, float, float, float]]:
@@ -120,7 +120,7 @@ def law_at(
     return slowed_bounds(bounds_of(row, time), pace, pace_rate), gains
 
 
-@compiled
+@compiled(borrows=True)
 def track_row(row: FloatArray, time: float, position: float, rate: float) -> tuple[float, float]:
     """Return ``track_axis`` of one axis from its row.
 
@@ -133,7 +133,7 @@ def track_row(row: FloatArray, time: float, position: float, rate: float) -> tup
     return track_paced_row(row, time, 1.0, 0.0, position, rate)
 
 
-@compiled
+@compiled(borrows=True)
 def track_paced_row(
     row: FloatArray, time: float, pace: float, pace_rate: float, position: float, rate: float
 ) -> tuple[float, float]:
@@ -167,7 +167,7 @@ def funnel_acceleration(
     return np.array([track_row(row, float(time), x, v)[0] for row, x, v in rows])
 
 
-@compiled
+@compiled(borrows=True)
 def track_axes(
     table: FloatArray,
     time: float,
@@ -200,7 +200,7 @@ def track_axes(
         acceleration[i] = limited_row(table[i], acceleration[i] + left * jumps[i], rate)
 
 
-@compiled
+@compiled(borrows=True)
 def limited_row(row: FloatArray, acceleration: float, rate: float) -> float:
     """Return an acceleration that keeps the limits of the axis [rad/s^2 or m/s^2].
 
@@ -216,7 +216,7 @@ def limited_row(row: FloatArray, acceleration: float, rate: float) -> float:
     return damped(min(max(acceleration, -most), most), rate, row[RATE_LIMIT], row[LIMIT_GAIN])
 
 
-@compiled
+@compiled(borrows=True)
 def _write_accelerations(
     table: FloatArray,
     time: float,
@@ -266,7 +266,7 @@ def write_jumps(
         jumps[i] = rest_jump(table[i], next_table[i]) if at_rest else jumps[i] - following[i]
 
 
-@compiled
+@compiled(borrows=True)
 def rest_jump(row: FloatArray, next_row: FloatArray) -> float:
     """Return by how much the acceleration jumps if the next cell is entered at rest [rad/s^2 or m/s^2].
 
@@ -292,7 +292,7 @@ def first_jumps(table: FloatArray, start: FloatArray | None) -> FloatArray:
     return np.array([-track_row(row, 0.0, x, 0.0)[0] for row, x in zip(table, start, strict=True)])
 
 
-@compiled
+@compiled(borrows=True)
 def write_bounds(table: FloatArray, time: float, bounds: FloatArray) -> None:
     """Write the lower, then the upper funnel bounds of all axes, shape (2 m,) [rad or m]."""
     m = table.shape[0]

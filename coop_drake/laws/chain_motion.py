@@ -7,7 +7,7 @@ the reference point of a link is its joint.
 
 import numpy as np
 
-from coop_drake.compiled import compiled
+from coop_drake.jit import compiled
 from coop_drake.laws.load_sharing import rotated
 from coop_drake.tree.pose import FloatArray
 
@@ -43,7 +43,7 @@ def move_chain(chain: FloatArray, state: FloatArray) -> FloatArray:
     return motion
 
 
-@compiled
+@compiled(borrows=True)
 def write_motion(chain: FloatArray, state: FloatArray, motion: FloatArray) -> None:
     """Write what ``move_chain`` returns, given the same arguments."""
     yaw = state[int(chain[0, POSITION]) + 2]
@@ -69,7 +69,7 @@ def write_motion(chain: FloatArray, state: FloatArray, motion: FloatArray) -> No
             motion[i, W] = w + turn * rate
 
 
-@compiled
+@compiled(borrows=True)
 def accelerate_chain(chain: FloatArray, robot: FloatArray, axes: FloatArray, motion: FloatArray) -> None:
     """Write (x'', y'', w') of every row as if the root had no acceleration."""
     motion[0, AX], motion[0, AY], motion[0, ALPHA] = 0.0, 0.0, 0.0

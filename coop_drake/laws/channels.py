@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from coop_drake.compiled import compiled
+from coop_drake.jit import compiled
 from coop_drake.tree.pose import FloatArray
 
 NOTHING = -1.0
@@ -18,7 +18,7 @@ def channel_rows(delay: int) -> int:
     return 1 + delay + max(delay, 1)
 
 
-@compiled
+@compiled(borrows=True)
 def carry_reports(
     kept: FloatArray, sent: FloatArray, arrives: bool, repeated: bool, delay: int, arrivals: FloatArray
 ) -> None:
@@ -48,7 +48,7 @@ def carry_reports(
         arrivals[0, 0], arrivals[0, 1] = kept[0, 0], kept[0, 1]
 
 
-@compiled
+@compiled(borrows=True)
 def carry_measurements(
     kept: FloatArray, number: int, measured: FloatArray, lost: bool, late: bool, following: FloatArray
 ) -> None:
@@ -81,7 +81,7 @@ def carry_measurements(
         _copy(measured, following[0, 1:])
 
 
-@compiled
+@compiled(borrows=True)
 def _copy(values: FloatArray, place: FloatArray) -> None:
     """Write values at a place; numba's own way also compiles a message for other shapes, which takes long."""
     for i in range(place.size):

@@ -24,7 +24,7 @@ from __future__ import annotations
 
 from math import atan2, cos, hypot, inf, sin
 
-from coop_drake.compiled import compiled
+from coop_drake.jit import compiled
 from coop_drake.laws.chain_motion import PX, PY, move_chain
 from coop_drake.laws.load_sharing import rotated
 from coop_drake.laws.sampling import whole_periods

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from coop_drake.compiled import compiled
+from coop_drake.jit import compiled
 from coop_drake.tree.pose import FloatArray
 
 PHASE = 0.15
@@ -27,7 +27,7 @@ def observer_gains(age: float) -> tuple[float, float]:
     return gain, LEAK * gain
 
 
-@compiled
+@compiled(borrows=True)
 def observe(
     rates: FloatArray,
     wanted: FloatArray,

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from coop_drake.compiled import compiled
+from coop_drake.jit import compiled
 
 CREEP_SPEED = 0.01
 """Speed below which Coulomb friction falls off with the speed [m/s]: small beside the speed of a transport,

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from coop_drake.compiled import compiled
+from coop_drake.jit import compiled
 from coop_drake.laws.funnels import CLOSING, STEEPEST, axis_bounds, check_intervals
 from coop_drake.laws.gains import FixedGains, GainSet, ScheduledGains, TransitionGains
 from coop_drake.laws.hand_over import shortest_hand_over
@@ -144,7 +144,7 @@ def _by_age(gains: ScheduledGains) -> Schedule:
     )  # fmt: skip
 
 
-@compiled
+@compiled(borrows=True)
 def scheduled_governor(schedule: Schedule, clearance: float) -> tuple[float, float, float]:
     """Return K, zeta and K_G of a transition: K = clamp(``wall_stiffness`` / b), the largest for b = 0.
 
@@ -162,7 +162,7 @@ def scheduled_governor(schedule: Schedule, clearance: float) -> tuple[float, flo
     return stiffness, schedule.damping_factor * root, schedule.governor_factor * root
 
 
-@compiled
+@compiled(borrows=True)
 def scheduled_axis(
     schedule: Schedule,
     is_joint: bool,

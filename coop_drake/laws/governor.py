@@ -13,7 +13,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from coop_drake.compiled import compiled
+from coop_drake.jit import compiled
 from coop_drake.tree.pose import FloatArray
 
 Value = TypeVar("Value", float, FloatArray)
@@ -97,7 +97,7 @@ def energy_margin(energy: float, clearance: float, stiffness: float) -> float:
     return 0.5 * stiffness * clearance * abs(clearance) - energy
 
 
-@compiled
+@compiled(borrows=True)
 def object_energy_margin(
     object_state: FloatArray, governor_position: FloatArray, clearance: float, stiffness: float
 ) -> float:

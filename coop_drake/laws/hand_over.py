@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from math import log
 
-from coop_drake.compiled import compiled
+from coop_drake.jit import compiled
 from coop_drake.laws.funnels import CLOSING, STEEPEST, decay_factor
 from coop_drake.tree.pose import FloatArray
 
@@ -35,7 +35,7 @@ def fading(time: float, duration: float) -> float:
     return decay_factor(time, CLOSING / duration, True)[0] if time < duration else 0.0
 
 
-@compiled
+@compiled(borrows=True)
 def governed_gains(row: FloatArray, time: float) -> tuple[float, float, float]:
     """Return K, zeta and K_G now: K = K_1 (K_0 / K_1)^f with f of ``fading``, and so for the others.
 

@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from coop_drake.compiled import compiled
+from coop_drake.jit import compiled
 from coop_drake.tree.pose import FloatArray
 
 HOLD_RATE = 10.0
@@ -27,7 +27,7 @@ SETTLING_TIME = 1.0
 """So long after a hold the clock's pace is 1 for all purposes [s]: at 10 / omega, b is below a thousandth."""
 
 
-@compiled
+@compiled(borrows=True)
 def lagging_clock(time: float, held: float, start: FloatArray) -> tuple[float, float, float, float]:
     """Return a, b, b' and the time that the clock loses, in closed form while h is constant.
 
@@ -48,7 +48,7 @@ def lagging_clock(time: float, held: float, start: FloatArray) -> tuple[float, f
     return a, b, HOLD_RATE * (a - b), start[2] + lost
 
 
-@compiled
+@compiled(borrows=True)
 def slowed_bounds(
     bounds: tuple[float, float, float, float, float, float], pace: float, pace_rate: float
 ) -> tuple[float, float, float, float, float, float]:

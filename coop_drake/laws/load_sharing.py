@@ -10,7 +10,7 @@ from math import cos, sin
 
 import numpy as np
 
-from coop_drake.compiled import compiled
+from coop_drake.jit import compiled
 from coop_drake.tree.pose import FloatArray
 
 
@@ -77,7 +77,7 @@ def wrench_share(
     return fx, fy, share * inertia * alpha - py * fx + px * fy
 
 
-@compiled
+@compiled(borrows=True)
 def end_effector_command(
     load: FloatArray, object_state: FloatArray, linear: FloatArray, axes: FloatArray, command: FloatArray
 ) -> None:

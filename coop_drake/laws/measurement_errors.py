@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from math import floor
 
-from coop_drake.compiled import compiled
+from coop_drake.jit import compiled
 from coop_drake.laws.random_draws import write_normals
 from coop_drake.tree.pose import FloatArray
 
@@ -23,7 +23,7 @@ def square_wave(number: int, size: float, length: float, phase: float) -> float:
     return size if passed - floor(passed) < 0.5 else -size
 
 
-@compiled
+@compiled(borrows=True)
 def write_errors(
     seed: int, deviations: FloatArray, waves: FloatArray, number: int, errors: FloatArray
 ) -> None:
@@ -43,7 +43,7 @@ def write_errors(
             errors[i] += square_wave(number, waves[i, 0], waves[i, 1], waves[i, 2])
 
 
-@compiled
+@compiled(borrows=True)
 def shift_back(values: FloatArray, before: FloatArray, share: float) -> None:
     """Replace what is measured by what it was a part of a period earlier, or will be later.
 

@@ -26,7 +26,7 @@ from math import hypot, sqrt
 import numpy as np
 import scipy  # It imports its parts when they are first used: only this motion needs them.
 
-from coop_drake.compiled import compiled
+from coop_drake.jit import compiled
 from coop_drake.laws.governor import ATTRACTION_RATE, governed_acceleration, tracking_energy
 from coop_drake.tree.pose import FloatArray
 
@@ -91,7 +91,7 @@ def reach_of(distance: float, period: float, periods: float, speed: float) -> fl
     return min(periods * period * speed, distance * growth)
 
 
-@compiled
+@compiled(borrows=True)
 def tracked_acceleration(
     position: float,
     velocity: float,

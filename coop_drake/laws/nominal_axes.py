@@ -22,7 +22,7 @@ from __future__ import annotations
 
 from math import exp
 
-from coop_drake.compiled import compiled
+from coop_drake.jit import compiled
 from coop_drake.laws.governor import governed_acceleration
 from coop_drake.tree.pose import FloatArray
 
@@ -39,7 +39,7 @@ def lag_factors(period: float, lag: float) -> tuple[float, float, float]:
     return left, lag * (1.0 - left), lag * period - lag * lag * (1.0 - left)
 
 
-@compiled
+@compiled(borrows=True)
 def carry_axes(
     state: FloatArray, commands: FloatArray, period: float, lag: float, following: FloatArray
 ) -> None:
@@ -60,7 +60,7 @@ def carry_axes(
         following[2, i] = u + left * gap
 
 
-@compiled
+@compiled(borrows=True)
 def pulled_axis(
     command: float, position: float, rate: float, expected: tuple[float, float], gains: tuple[float, float]
 ) -> float:
@@ -77,7 +77,7 @@ def pulled_axis(
     return command + governed_acceleration(away, fast, 0.0, gains[0], gains[1])
 
 
-@compiled
+@compiled(borrows=True)
 def pull_axes(
     commands: FloatArray,
     object_state: FloatArray,
@@ -103,7 +103,7 @@ def pull_axes(
         pulled[i] = pulled_axis(commands[i], x, rate, (expected[0, i], expected[1, i]), gains)
 
 
-@compiled
+@compiled(borrows=True)
 def place_on_axes(axes: FloatArray, mounting: FloatArray, robot_state: FloatArray) -> None:
     """Write the angles of a robot whose object and joints stand and move as given: yaw, joints, and rates.
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from coop_drake.compiled import compiled
+from coop_drake.jit import compiled
 from coop_drake.laws.funnels import FunnelBounds
 from coop_drake.tree.pose import FloatArray
 
@@ -31,7 +31,7 @@ def ramped_gain(time: float, gain: float, ramp_rate: float) -> tuple[float, floa
     return gain * (1.0 - (1.0 + ramp_rate * time) * left), gain * ramp_rate * ramp_rate * time * left
 
 
-@compiled
+@compiled(borrows=True)
 def track_axis(
     position: float,
     rate: float,
@@ -68,7 +68,7 @@ def track_axis(
     return track_distances(dl, du, np.log(dl / du), rate, bounds, gains)
 
 
-@compiled
+@compiled(borrows=True)
 def track_distances(
     dl: float,
     du: float,

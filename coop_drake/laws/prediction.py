@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from coop_drake.compiled import compiled
+from coop_drake.jit import compiled
 from coop_drake.laws.load_sharing import end_effector_command
 from coop_drake.laws.robot_dynamics import base_acceleration, estimate_object
 from coop_drake.tree.pose import FloatArray

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from math import cos, log, pi, sin, sqrt
 
-from coop_drake.compiled import compiled
+from coop_drake.jit import compiled
 from coop_drake.tree.pose import FloatArray
 
 _WORD = 0xFFFFFFFF
@@ -22,7 +22,7 @@ _ROUNDS = 10
 """Multipliers, steps of the key and number of rounds, as published."""
 
 
-@compiled
+@compiled(borrows=True)
 def random_words(counter: tuple[int, int, int, int], key: tuple[int, int]) -> tuple[int, int, int, int]:
     """Return the four words of Philox4x32-10, each from 0 to 2^32 - 1.
 
@@ -52,7 +52,7 @@ def uniform_pair(seed: int, number: int) -> tuple[float, float]:
     return _UNIT * words[0], _UNIT * words[1]
 
 
-@compiled
+@compiled(borrows=True)
 def write_normals(seed: int, number: int, normals: FloatArray) -> None:
     """Write independent numbers with a standard normal distribution, by the formula of Box and Muller [-].
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from coop_drake.compiled import compiled
+from coop_drake.jit import compiled
 from coop_drake.laws.team_chain import team_chain
 from coop_drake.laws.team_dynamics import TeamWork, team_accelerations, team_work
 from coop_drake.tree.bodies import Bodies

@@ -7,7 +7,7 @@ those of another robot.
 
 from __future__ import annotations
 
-from coop_drake.compiled import compiled
+from coop_drake.jit import compiled
 from coop_drake.laws.axis_table import (
     ENERGY_BOUND,
     GOAL_LOWER,
@@ -118,7 +118,7 @@ def position_arrival(distance: float, speed: float, tolerance: float) -> float:
     return min(1.0 - distance / ((1.0 - EROSION) * tolerance), 1.0 - speed / SPEED_TOLERANCE)
 
 
-@compiled
+@compiled(borrows=True)
 def axis_ready(row: FloatArray, next_row: FloatArray, position: float, rate: float) -> float:
     """Return the margin with which one axis may enter the next cell: inside its goal, and V small enough.
 
@@ -139,7 +139,7 @@ def axis_ready(row: FloatArray, next_row: FloatArray, position: float, rate: flo
     return min(inside, funnel_margin(energy, next_row[ENERGY_BOUND]))
 
 
-@compiled
+@compiled(borrows=True)
 def axis_arrival(row: FloatArray, position: float, rate: float) -> float:
     """Return the margin with which, in the last cell, one axis is inside its goal and at rest."""
     inside = interval_margin(position, row[GOAL_LOWER], row[GOAL_UPPER])

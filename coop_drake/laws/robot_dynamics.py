@@ -9,7 +9,7 @@ from math import atan2
 
 import numpy as np
 
-from coop_drake.compiled import compiled
+from coop_drake.jit import compiled
 from coop_drake.laws.chain_motion import (
     ALPHA,
     AX,
@@ -50,7 +50,7 @@ def frame_twist(chain: FloatArray, state: FloatArray) -> tuple[float, float, flo
     return state[first] + motion[last, VX], state[first + 1] + motion[last, VY], motion[last, W]
 
 
-@compiled
+@compiled(borrows=True)
 def estimate_object(
     chain: FloatArray, p_LE: FloatArray, robot: FloatArray, pose: FloatArray, object_state: FloatArray
 ) -> None:
@@ -152,7 +152,7 @@ def base_acceleration(
     return _of_root(motion[chain.shape[0] - 1], command)
 
 
-@compiled
+@compiled(borrows=True)
 def _of_root(frame: FloatArray, command: FloatArray) -> tuple[float, float, float]:
     """Return the root's acceleration that gives the last frame of a chain the acceleration commanded."""
     alpha = command[2] - frame[ALPHA]
@@ -163,7 +163,7 @@ def _of_root(frame: FloatArray, command: FloatArray) -> tuple[float, float, floa
     )
 
 
-@compiled
+@compiled(borrows=True)
 def _add_inertia(
     row: FloatArray, motion: FloatArray, ax: float, ay: float, alpha: float, force: FloatArray
 ) -> None:

@@ -15,7 +15,7 @@ from __future__ import annotations
 
 from math import log
 
-from coop_drake.compiled import compiled
+from coop_drake.jit import compiled
 from coop_drake.laws.axis_table import (
     LOG_GAIN,
     POSITION_GAIN,
@@ -34,7 +34,7 @@ def product_bounds(a: float, b: float, c: float, d: float) -> tuple[float, float
     return min(a * c, a * d, b * c, b * d), max(a * c, a * d, b * c, b * d)
 
 
-@compiled
+@compiled(borrows=True)
 def slope_bounds(
     row: FloatArray, time: float, position: float, reach: float, rate: float
 ) -> tuple[float, float, float, float]:
@@ -55,7 +55,7 @@ def slope_bounds(
     return slopes_between(bounds, gains, ends[0], ends[1], rate)
 
 
-@compiled
+@compiled(borrows=True)
 def gains_of(row: FloatArray, time: float) -> tuple[float, float, float, float, float]:
     """Return the gains of one axis as ``track_axis`` takes them: kappa, k1, k1', k2 and the saturation."""
     k1, k1_dot = ramped_gain(time, row[POSITION_GAIN], row[RAMP_RATE])
@@ -68,7 +68,7 @@ def saturated(place: float, saturation: float) -> float:
     return min(max(place, saturation), 1.0 - saturation)
 
 
-@compiled
+@compiled(borrows=True)
 def slopes_between(
     bounds: tuple[float, float, float, float, float, float],
     gains: tuple[float, float, float, float, float],

@@ -20,7 +20,7 @@ from __future__ import annotations
 
 from math import inf
 
-from coop_drake.compiled import compiled
+from coop_drake.jit import compiled
 from coop_drake.laws.funnels import CLOSING, STEEPEST
 
 __all__ = ["FUNNEL_SHARE", "damped", "funnel_rate", "slowed_decay_rate", "speed_damping"]

@@ -22,7 +22,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from coop_drake.compiled import compiled
+from coop_drake.jit import compiled
 from coop_drake.laws.chain_motion import (
     ALPHA,
     AX,
@@ -155,7 +155,7 @@ def stick(
     team_accelerations(tree, bases, places, wrenches, efforts, gravity, state, work, accelerations)
 
 
-@compiled
+@compiled(borrows=True)
 def _add(
     j: int, force: float, tree: FloatArray, wrenches: FloatArray, efforts: FloatArray, first: int
 ) -> None:
@@ -166,7 +166,7 @@ def _add(
         efforts[int(tree[1 + j - first, RATE]) - tree.shape[0] - 2] += force
 
 
-@compiled
+@compiled(borrows=True)
 def _choose(room: StickingRoom) -> None:
     """Write the forces: which of them are at their limits, and what the others are."""
     m, wanted, found, chosen = room.wanted.size, room.wanted, room.found, room.chosen
@@ -205,7 +205,7 @@ def _choose(room: StickingRoom) -> None:
         found[i] = min(max(found[i], -room.limits[i]), room.limits[i])
 
 
-@compiled
+@compiled(borrows=True)
 def _motion_of(
     tree: FloatArray, bases: IntArray, places: FloatArray, state: FloatArray, work: TeamWork,
     accelerations: FloatArray, joints: FloatArray, rates: FloatArray, second: FloatArray,

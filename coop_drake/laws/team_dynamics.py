@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from coop_drake.compiled import compiled
+from coop_drake.jit import compiled
 from coop_drake.laws.chain_motion import (
     AX,
     AY,
@@ -79,7 +79,7 @@ def team_work(tree: FloatArray) -> TeamWork:
     )
 
 
-@compiled
+@compiled(borrows=True)
 def team_accelerations(
     tree: FloatArray,
     pushed: IntArray,
@@ -144,7 +144,7 @@ def team_accelerations(
         accelerations[int(tree[i, RATE]) - size] = wanted[2 + i]
 
 
-@compiled
+@compiled(borrows=True)
 def _write_inertia(
     row: FloatArray, motion: FloatArray, gravity: float, inertia: FloatArray, force: FloatArray
 ) -> None:
@@ -160,14 +160,14 @@ def _write_inertia(
     force[0], force[1], force[2] = fx, fy, cx * fy - cy * fx
 
 
-@compiled
+@compiled(borrows=True)
 def _direction(row: FloatArray, motion: FloatArray) -> tuple[float, float, float]:
     """Return what a unit rate of a joint adds to its link's velocity at the object's origin, and to w."""
     turn = row[TURN]
     return motion[UX] + turn * motion[PY], motion[UY] - turn * motion[PX], turn
 
 
-@compiled
+@compiled(borrows=True)
 def _write_row(tree: FloatArray, motion: FloatArray, inertia: FloatArray, i: int, matrix: FloatArray) -> None:
     """Write the row of the mass matrix of the joint that leads to link i, left of its diagonal and on it."""
     sx, sy, w = _direction(tree[i], motion[i])
@@ -182,7 +182,7 @@ def _write_row(tree: FloatArray, motion: FloatArray, inertia: FloatArray, i: int
         j = int(tree[j, PARENT])
 
 
-@compiled
+@compiled(borrows=True)
 def solve_tree(parents: IntArray, matrix: FloatArray, vector: FloatArray) -> None:
     """Replace a vector b by the solution x of A x = b, A being the mass matrix of a tree.
 

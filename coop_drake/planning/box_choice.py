@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from coop_drake.compiled import compiled
+from coop_drake.jit import compiled
 from coop_drake.laws.gain_schedule import Schedule
 from coop_drake.laws.governor import (
     FIELD_SPEED,
@@ -240,21 +240,21 @@ def _soonest_end(
     return soonest
 
 
-@compiled
+@compiled(borrows=True)
 def _begun(waypoints: Waypoints, found: Sequences, i: int, p: int) -> float:
     """When the box with padding p from waypoint i is entered, with what a box costs besides its time [s]."""
     begun: float = found.time[i, p] + BOX_COST / waypoints.pads[p]
     return begun
 
 
-@compiled
+@compiled(borrows=True)
 def _least_time(waypoints: Waypoints, j: int) -> float:
     """Time in which the path up to waypoint j is passed at ``LARGEST_SPEED`` [s]."""
     least: float = waypoints.places[j] / LARGEST_SPEED
     return least
 
 
-@compiled
+@compiled(borrows=True)
 def _is_useful(soonest: float, j: int, found: Sequences) -> bool:
     """Whether a sequence that reaches waypoint j at a time would be the fastest for some next padding."""
     nexts = 1 if j + 1 == len(found.time) else found.time.shape[1]
@@ -264,7 +264,7 @@ def _is_useful(soonest: float, j: int, found: Sequences) -> bool:
     return useful
 
 
-@compiled
+@compiled(borrows=True)
 def _widened(
     waypoints: Waypoints, boxes: BegunBoxes, i: int, p: int, lower: FloatArray, upper: FloatArray
 ) -> None:

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from coop_drake.compiled import compiled
+from coop_drake.jit import compiled
 from coop_drake.laws.axis_table import (
     GOAL_LOWER,
     GOAL_UPPER,
@@ -67,7 +67,7 @@ class ObjectMotion(NamedTuple):
     known: IntArray
 
 
-@compiled
+@compiled(borrows=True)
 def smallest(values: FloatArray) -> float:
     """The smallest of some values, shape (k,); numpy's ``min`` takes longer to compile."""
     least = np.inf
@@ -106,7 +106,7 @@ def object_motion(
     )  # fmt: skip
 
 
-@compiled
+@compiled(borrows=True)
 def object_may_leave(motion: ObjectMotion, check: int, time: float) -> bool:
     """Whether the object lets the next box be entered at a check, or has arrived in the last box.
 
@@ -135,7 +135,7 @@ def object_may_leave(motion: ObjectMotion, check: int, time: float) -> bool:
     return bool(clearance_margin(margin, stiffness, clearance) >= 0.0)
 
 
-@compiled
+@compiled(borrows=True)
 def soonest_exit(motion: ObjectMotion, time_limit: float) -> float:
     """Return when the object may first leave the box, infinity beyond the limit: axes only delay this [s]."""
     time = 0.0
@@ -148,7 +148,7 @@ def soonest_exit(motion: ObjectMotion, time_limit: float) -> float:
     return np.inf
 
 
-@compiled
+@compiled(borrows=True)
 def _clearance_at(arc_lengths: FloatArray, clearances: FloatArray, s: float) -> float:
     """Return the clearance between two waypoints [m]."""
     for k in range(len(arc_lengths) - 1):
@@ -158,7 +158,7 @@ def _clearance_at(arc_lengths: FloatArray, clearances: FloatArray, s: float) -> 
     return float(clearances[-1])
 
 
-@compiled
+@compiled(borrows=True)
 def _advance(motion: ObjectMotion, state: FloatArray, h: float) -> None:
     """Take one step of (s, s', s_G) at constant speed of p_G, which changes slowly against the step."""
     s, v, g = state[0], state[1], state[2]
@@ -205,7 +205,7 @@ RATE_FRACTION = 0.9
 """Fraction of the energy allowance of the next funnel that the rate of an axis may take [-]."""
 
 
-@compiled
+@compiled(borrows=True)
 def _advance_axis(state: FloatArray, at: int, m: int, time: float, row: FloatArray) -> None:
     """Advance one axis by one period, in as many steps as its stiffness needs now."""
     fastest = axis_frequency(row, time, state[at], max(row[SATURATION], LEAST_SATURATION))
@@ -229,7 +229,7 @@ def _advance_axis(state: FloatArray, at: int, m: int, time: float, row: FloatArr
         now, gains_now = end, gains_end
 
 
-@compiled
+@compiled(borrows=True)
 def _axes_may_leave(state: FloatArray, table: FloatArray, schedule: Schedule, last: bool) -> bool:
     """Return whether the axes let the next box be entered, or rest at the goal in the last box."""
     m = table.shape[0]

@@ -9,11 +9,11 @@ from typing import NamedTuple
 import numpy as np
 from shapely import MultiPolygon, Polygon
 
-from coop_drake.compiled import compiled
 from coop_drake.geometry.body_pairs import TOUCH, BodyPairs
 from coop_drake.geometry.distances import separated
 from coop_drake.geometry.piece_sweeps import joint_width, over_joint, rounded_sweep
 from coop_drake.geometry.swept_tree import SweptTree
+from coop_drake.jit import compiled
 from coop_drake.planning.cells.cells import FreeBox
 from coop_drake.planning.duration import SETTLING_TIME, SPEED_PER_CLEARANCE
 from coop_drake.planning.sampling.collision import ObstacleGrid, densified, grid_inside, ring_clearance
@@ -42,7 +42,7 @@ class BoxArrays(NamedTuple):
     upper: FloatArray
 
 
-@compiled
+@compiled(borrows=True)
 def enclosing_disc(ring: FloatArray, disc: FloatArray) -> None:
     """Write a disc (x, y, radius) that holds a ring, shape (n, 2) [m], into ``disc``, shape (3,) [m]."""
     disc[0], disc[1], disc[2] = 0.0, 0.0, 0.0

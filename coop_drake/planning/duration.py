@@ -8,9 +8,9 @@ from math import hypot, inf, isfinite, sqrt
 import numpy as np
 
 from coop_drake.answers.plan import Plan
-from coop_drake.compiled import compiled
 from coop_drake.geometry.boundary import edges_of, signed_distance
 from coop_drake.geometry.distances import nearest_fraction
+from coop_drake.jit import compiled
 from coop_drake.laws import TransitionGains
 from coop_drake.laws.axis_table import (
     FADING_TIME,
@@ -97,7 +97,7 @@ SHORTEST_LOOKAHEAD = 2e-3
 vanishes."""
 
 
-@compiled
+@compiled(borrows=True)
 def _steer(path: FloatArray, x: float, y: float, ahead: float, radius: float) -> tuple[float, float]:
     """Return a field along a path, of ``FIELD_SPEED``, slower within ``radius`` of its end as in (13)."""
     nearest, segment, fraction = np.inf, 0, 0.0
@@ -126,7 +126,7 @@ def _steer(path: FloatArray, x: float, y: float, ahead: float, radius: float) ->
     return speed * ux / norm, speed * uy / norm
 
 
-@compiled
+@compiled(borrows=True)
 def _margin(state: FloatArray, edges: FloatArray, stiffness: float) -> tuple[float, float]:
     """Return Delta E of (15) in a cell, and the clearance of p_G [m]."""
     clearance = signed_distance(edges, state[4], state[5])
@@ -134,7 +134,7 @@ def _margin(state: FloatArray, edges: FloatArray, stiffness: float) -> tuple[flo
     return energy_margin(energy, clearance, stiffness), clearance
 
 
-@compiled
+@compiled(borrows=True)
 def _rates(
     state: FloatArray,
     time: float,
@@ -170,7 +170,7 @@ def _rates(
         result[6 + i], result[6 + m + i] = rate, limited_row(table[i], wanted, rate)
 
 
-@compiled
+@compiled(borrows=True)
 def _ready(
     state: FloatArray,
     time: float,
@@ -191,7 +191,7 @@ def _ready(
     return bool(clearance_margin(margin, next_stiffness, inradius) >= 0.0)
 
 
-@compiled
+@compiled(borrows=True)
 def _write_jumps(
     state: FloatArray, time: float, table: FloatArray, next_table: FloatArray, jumps: FloatArray
 ) -> None:
@@ -205,7 +205,7 @@ def _write_jumps(
             jumps[i] = track_row(table[i], time, x, rate)[0] - track_row(next_table[i], 0.0, x, rate)[0]
 
 
-@compiled
+@compiled(borrows=True)
 def _arrived(state: FloatArray, table: FloatArray, target: FloatArray, tolerance: float) -> bool:
     """Return whether the goal is reached and the motion has ended."""
     m = table.shape[0]
@@ -216,7 +216,7 @@ def _arrived(state: FloatArray, table: FloatArray, target: FloatArray, tolerance
     return bool(position_arrival(distance, hypot(state[2], state[3]), tolerance) >= 0.0)
 
 
-@compiled
+@compiled(borrows=True)
 def axis_frequency(row: FloatArray, time: float, position: float, saturation: float) -> float:
     """Return the angular frequency with which the log term of (18) pulls at an axis where it is now [rad/s].
 
@@ -233,7 +233,7 @@ def axis_frequency(row: FloatArray, time: float, position: float, saturation: fl
     return width / (dl * du) * sqrt(row[LOG_GAIN] * (1.0 + abs(np.log(dl / du))))
 
 
-@compiled
+@compiled(borrows=True)
 def _steps(state: FloatArray, time: float, row: FloatArray, table: FloatArray) -> int:
     """Return the number of integration steps until the next check, enough for the fastest motion now."""
     fastest = max(sqrt(row[STIFFNESS]), ATTRACTION_RATE)
@@ -242,7 +242,7 @@ def _steps(state: FloatArray, time: float, row: FloatArray, table: FloatArray) -
     return int(min(max(np.ceil(PERIOD * fastest / RADIANS_PER_STEP), FEWEST_STEPS), MOST_STEPS))
 
 
-@compiled
+@compiled(borrows=True)
 def _note_peaks(state: FloatArray, rates: FloatArray, peaks: FloatArray) -> None:
     """Write the speed of the object and the rates and accelerations of all axes that exceed those before."""
     peaks[0] = max(peaks[0], hypot(state[2], state[3]))

@@ -7,14 +7,14 @@ from __future__ import annotations
 
 from math import hypot, inf, sqrt
 
-from coop_drake.compiled import compiled
 from coop_drake.geometry.boundary import signed_distance
 from coop_drake.geometry.distances import meets_ring, ring_holds, squared_distance, squared_ring_distance
+from coop_drake.jit import compiled
 from coop_drake.tree.pose import FloatArray, IntArray
 from coop_drake.tree.team_arrays import TeamArrays
 
 
-@compiled
+@compiled(borrows=True)
 def nearest_to_walls(
     team: TeamArrays, vertices: FloatArray, discs: FloatArray, walls: FloatArray
 ) -> tuple[float, int]:
@@ -34,7 +34,7 @@ def nearest_to_walls(
     return nearest, which
 
 
-@compiled
+@compiled(borrows=True)
 def piece_to_walls(
     team: TeamArrays, vertices: FloatArray, discs: FloatArray, walls: FloatArray, i: int, bound: float
 ) -> float:
@@ -58,7 +58,7 @@ def piece_to_walls(
     return distance - team.radii[i]
 
 
-@compiled
+@compiled(borrows=True)
 def _depth_beyond(vertices: FloatArray, first: int, last: int, walls: FloatArray) -> float:
     """Depth of the deepest vertex: of the piece outside the floor, or of a wall inside the piece [m]."""
     depth = 0.0
@@ -71,7 +71,7 @@ def _depth_beyond(vertices: FloatArray, first: int, last: int, walls: FloatArray
     return depth
 
 
-@compiled
+@compiled(borrows=True)
 def nearest_pair(team: TeamArrays, vertices: FloatArray, discs: FloatArray) -> tuple[float, int]:
     """Smallest signed distance of a pair of pieces that must not touch [m], and which pair it is.
 
@@ -85,7 +85,7 @@ def nearest_pair(team: TeamArrays, vertices: FloatArray, discs: FloatArray) -> t
     return nearest, which
 
 
-@compiled
+@compiled(borrows=True)
 def pair_apart(team: TeamArrays, vertices: FloatArray, discs: FloatArray, k: int, bound: float) -> float:
     """Return the signed distance of pair k, or less if that is not below a bound [m]."""
     i, j = team.pairs[k, 0], team.pairs[k, 1]
@@ -95,7 +95,7 @@ def pair_apart(team: TeamArrays, vertices: FloatArray, discs: FloatArray, k: int
     return _between(vertices, team.pieces[i], team.pieces[j]) - team.radii[i] - team.radii[j]
 
 
-@compiled
+@compiled(borrows=True)
 def _between(vertices: FloatArray, one: IntArray, other: IntArray) -> float:
     """Signed distance [m] of two hulls, rows of ``TeamArrays.pieces``; minus the deepest vertex's depth."""
     squared, depth, overlap = inf, 0.0, False

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from coop_drake.answers.plan import Plan
-from coop_drake.compiled import prepared
 from coop_drake.geometry.boundary import BoundaryDistance
 from coop_drake.simulation.clearance import TeamClearance
 from coop_drake.simulation.step_kernels import margins
@@ -88,7 +87,6 @@ class Invariants:
             (BoundaryDistance(cell.tidied).edges, np.array(cell.lower), np.array(cell.upper))
             for cell in plan.cells
         ]
-        self._margins: Callable[..., tuple[Any, ...]] | None = None
         self._axes = ("object angle", *plan.joint_names)
 
     def check(self, sample: Sample) -> Margins:
@@ -97,9 +95,7 @@ class Invariants:
             *(sample.z, *self._cells[sample.cell], sample.funnel_lower, sample.funnel_upper),
             *(sample.commanded_wrenches, sample.measured_wrenches),
         )
-        if self._margins is None:
-            self._margins = prepared(margins, self._clearance.kernel_arguments, *arguments)
-        measured = _Measured(*self._margins(*arguments))
+        measured = _Measured(*margins(*self._clearance.kernel_arguments, *arguments))
         broken = [*self._broken(sample, measured)]
         if self._exact:
             broken.extend(_inexact(sample, measured.wrench_error))

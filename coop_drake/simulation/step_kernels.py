@@ -6,8 +6,8 @@ from math import inf
 
 import numpy as np
 
-from coop_drake.compiled import compiled
 from coop_drake.geometry.boundary import signed_distance
+from coop_drake.jit import compiled
 from coop_drake.simulation.convex_distance import nearest_pair, nearest_to_walls
 from coop_drake.tree.pose import FloatArray
 from coop_drake.tree.team_arrays import TeamArrays, moved, place
@@ -43,7 +43,7 @@ def place_pieces(team: TeamArrays, z: FloatArray, vertices: FloatArray, discs: F
             vertices[k, 0], vertices[k, 1] = moved(x, y, cosine, sine, u, v)
 
 
-@compiled
+@compiled(borrows=True)
 def margins(
     team: TeamArrays, walls: FloatArray,
     z: FloatArray, cell: FloatArray, lower: FloatArray, upper: FloatArray,
@@ -101,7 +101,7 @@ def row_figures(
     return spread, difference, energy_margins.min(), grasp_errors.max(), lag, 1.0 * causes.any()
 
 
-@compiled
+@compiled(borrows=True)
 def largest_difference(rows: FloatArray, others: FloatArray) -> float:
     """Return the largest magnitude of a component of a difference, NaN if a component is NaN.
 
@@ -119,7 +119,7 @@ def largest_difference(rows: FloatArray, others: FloatArray) -> float:
     return largest
 
 
-@compiled
+@compiled(borrows=True)
 def _narrowest(z: FloatArray, lower: FloatArray, upper: FloatArray) -> tuple[float, int]:
     """Return the smallest distance of an axis to its interval's ends, and the axis; NaN if one is NaN."""
     least, axis = inf, 0

@@ -7,11 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from pydrake.systems.framework import Context
 
-from coop_drake.compiled import prepared
 from coop_drake.diagram.station import Loop, Places, PortRow
 from coop_drake.laws import total_wrench
 from coop_drake.simulation.step_kernels import row_figures
-from coop_drake.systems.block import NUMBER
 from coop_drake.tree.pose import FloatArray
 
 
@@ -95,15 +93,8 @@ class Telemetry:
         ends = np.cumsum([part.size for part in places]).tolist()
         parts = zip(places, ends, strict=True)
         self._parts = [(slice(end - part.size, end), part.shape) for part, end in parts]
-        at, none = (
-            Places(*[np.empty(part.shape) for part in places]),
-            self._team.grasps.errors(self._plant_context),
-        )
-        figures = at.governors, at.accelerations, at.realised, at.energy_margins, none
-        self._figures = prepared(row_figures, (), *figures, at.clock_lag, at.causes)
         grasps = np.array([[robot.X_LE.x, robot.X_LE.y] for robot in self._team.robots])
         self._load = grasps, self._team.object_inertia.p_LLcm
-        self._total = prepared(total_wrench, (), at.commanded_wrenches, *self._load, NUMBER)
 
     def read(self) -> Sample:
         """Read the present instant."""
@@ -111,7 +102,7 @@ class Telemetry:
         at = Places(*[row[part].reshape(shape) for part, shape in self._parts])
         state = team.plant.GetPositionsAndVelocities(self._plant_context)[self._own]
         z, errors = state[: self._z], team.grasps.errors(self._plant_context)
-        spread, difference, margin, error, lag, held = self._figures(
+        spread, difference, margin, error, lag, held = row_figures(
             *(at.governors, at.accelerations, at.realised, at.energy_margins, errors, at.clock_lag, at.causes)
         )
         cell, entry, arrived = at.instant.tolist()
@@ -128,7 +119,7 @@ class Telemetry:
             funnel_lower=at.funnel_lower,
             funnel_upper=at.funnel_upper,
             energy_margin=margin,
-            object_wrench=self._total(at.commanded_wrenches, *self._load, float(z[2])),
+            object_wrench=total_wrench(at.commanded_wrenches, *self._load, float(z[2])),
             commanded_wrenches=at.commanded_wrenches,
             measured_wrenches=team.grasps.wrenches(self._plant_context),
             grasp_error=error,

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 from pydrake.systems.framework import BasicVector, Context, DiscreteValues, EventStatus
 
-from coop_drake.compiled import prepared
 from coop_drake.laws.arrival import FAR, ArrivalGoal, arrival_margin, mean_samples
 from coop_drake.systems.block import Block
 from coop_drake.systems.current_cell import CURRENT_CELL_SIZE, index_of
@@ -35,7 +36,7 @@ class ArrivalMonitor(Block):
     def __init__(self, goal: ArrivalGoal, cells: int, period: float, offset: float = 0.0) -> None:
         super().__init__()
         self._shape, self._cells = (2 * mean_samples(period), goal.place.size), cells
-        self._margin = prepared(arrival_margin, goal, np.empty(self._shape), 0)
+        self._margin = partial(arrival_margin, *goal)
         self._state = self.DeclareVectorInputPort("robot_state", 2 * goal.place.size)
         self._pose = self.DeclareVectorInputPort("object_pose", 3)
         self._cell = self.DeclareVectorInputPort("current_cell", CURRENT_CELL_SIZE)

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
 from pydrake.systems.framework import BasicVector, Context, DiscreteValues, EventStatus
 
-from coop_drake.compiled import prepared
 from coop_drake.laws.axis_table import first_jumps, track_axes, write_bounds, write_jumps
 from coop_drake.systems.axis_laws import AxisLaw
-from coop_drake.systems.block import NUMBER, VECTOR, Block
+from coop_drake.systems.block import Block
 from coop_drake.systems.current_cell import CURRENT_CELL_SIZE, READY_SIZE, index_of
 from coop_drake.systems.funnel_clock import CLOCK_SIZE, clock_of
 from coop_drake.systems.jump_memory import JumpMemory
@@ -64,9 +64,8 @@ class AxisPpc(Block):
         if not laws or len({law.axes for law in laws}) != 1 or laws[0].axes < 1:
             raise ValueError("AxisPpc needs one law for each cell, all of the same axes, the angle first")
         self._tables = [law.table for law in laws]
-        ports = VECTOR, VECTOR, VECTOR, VECTOR, VECTOR
-        self._track = [prepared(track_axes, [table], NUMBER, *ports) for table in self._tables]
-        self._bounds = [prepared(write_bounds, [table], NUMBER, VECTOR) for table in self._tables]
+        self._track = [partial(track_axes, table) for table in self._tables]
+        self._bounds = [partial(write_bounds, table) for table in self._tables]
         axes = laws[0].axes
         self._memory, self._nothing = JumpMemory(self._tables), EventStatus.DidNothing()
         self._object = self.DeclareVectorInputPort("object_state", 6)

@@ -6,11 +6,7 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any
 
-import numpy as np
 from pydrake.systems.framework import Diagram, LeafSystem
-
-NUMBER, VECTOR = 0.0, np.zeros(1)
-"""Examples for `coop_drake.compiled.prepared`: a number, and the value of a port."""
 
 
 class Block(LeafSystem):

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from pydrake.systems.framework import BasicVector, Context, DiscreteValues, EventStatus
 
-from coop_drake.compiled import prepared
 from coop_drake.laws.departure import alarm_at, axis_level, largest_departure
 from coop_drake.laws.robot_dynamics import estimate_object
-from coop_drake.systems.block import VECTOR, Block
+from coop_drake.systems.block import Block
 from coop_drake.systems.current_cell import CURRENT_CELL_SIZE, index_of
 from coop_drake.systems.nominal_kernels import NOMINAL_SIZE
 from coop_drake.tree.pose import FloatArray
@@ -77,10 +77,10 @@ class DepartureMonitor(Block):
     def __init__(self, robot: MonitoredRobot) -> None:
         super().__init__()
         self._robot, self._axes = robot, robot.axis_alarms.shape[2]
-        pair, size = np.empty((2, self._axes)), 2 * (2 + robot.mounting.size)
-        self._estimate = prepared(estimate_object, (robot.chain, robot.p_LE), VECTOR, VECTOR, VECTOR)
+        size = 2 * (2 + robot.mounting.size)
+        self._estimate = partial(estimate_object, robot.chain, robot.p_LE)
         known = robot.chain, robot.p_LE, robot.mounting
-        self._largest = prepared(largest_departure, known, VECTOR, VECTOR, VECTOR, pair, VECTOR, pair)
+        self._largest = partial(largest_departure, *known)
         self._state = self.DeclareVectorInputPort("robot_state", size)
         self._pose = self.DeclareVectorInputPort("object_pose", 3)
         self._led = self.DeclareVectorInputPort("nominal", NOMINAL_SIZE)

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from coop_drake.compiled import compiled
 from coop_drake.geometry.boundary import signed_distance
 from coop_drake.harmonic_maps.field import velocity_in_field
+from coop_drake.jit import compiled
 from coop_drake.laws.governor import (
     driving_margin,
     governed_acceleration,
@@ -19,7 +19,7 @@ from coop_drake.tree.pose import FloatArray
 __all__ = ["accelerate_object", "cell_margin", "govern"]
 
 
-@compiled
+@compiled(borrows=True)
 def cell_margin(
     edges: FloatArray, stiffness: float, object_state: FloatArray, governor_position: FloatArray
 ) -> float:
@@ -35,7 +35,7 @@ def cell_margin(
     return object_energy_margin(object_state, governor_position, clearance, stiffness)
 
 
-@compiled
+@compiled(borrows=True)
 def accelerate_object(
     gains: tuple[float, float, float],
     speed_limit: float,
@@ -61,7 +61,7 @@ def accelerate_object(
     acceleration[0], acceleration[1] = ax - damping * vx, ay - damping * vy
 
 
-@compiled
+@compiled(borrows=True)
 def govern(
     row: FloatArray,
     edges: FloatArray,

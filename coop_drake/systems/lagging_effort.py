@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 from pydrake.systems.framework import BasicVector, Context, DiscreteValues
 
-from coop_drake.compiled import prepared
 from coop_drake.laws.actuators import lag_behind
-from coop_drake.systems.block import NUMBER, VECTOR, Block
+from coop_drake.systems.block import Block
 from coop_drake.tree.pose import FloatArray
 
 
@@ -38,7 +39,7 @@ class LaggingEffort(Block):
         super().__init__()
         if not lag > 0.0 or not period > 0.0:
             raise ValueError(f"LaggingEffort needs a positive lag and period, not {lag} and {period}")
-        self._follow = prepared(lag_behind, [lag], NUMBER, VECTOR, VECTOR, VECTOR)
+        self._follow = partial(lag_behind, lag)
         self._held = self.DeclareVectorInputPort("held", size)
         self.DeclareDiscreteState(np.zeros(1 + size))
         self.DeclareVectorOutputPort("given", size, self._write_given)

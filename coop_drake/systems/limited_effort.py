@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 from pydrake.systems.framework import BasicVector, Context
 
-from coop_drake.compiled import prepared
 from coop_drake.laws.actuators import limit_efforts
-from coop_drake.systems.block import VECTOR, Block
+from coop_drake.systems.block import Block
 from coop_drake.tree.pose import FloatArray
 
 
@@ -31,7 +32,7 @@ class LimitedEffort(Block):
         super().__init__()
         if not (limits > 0.0).all():
             raise ValueError(f"LimitedEffort needs positive limits, not {limits.tolist()}")
-        self._limit, size = prepared(limit_efforts, [limits], VECTOR), limits.size + 1
+        self._limit, size = partial(limit_efforts, limits), limits.size + 1
         self._asked = self.DeclareVectorInputPort("asked", size)
         self.DeclareVectorOutputPort("given", size, self._write_given)
 

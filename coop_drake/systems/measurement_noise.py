@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 from pydrake.systems.framework import BasicVector, Context
 
-from coop_drake.compiled import prepared
 from coop_drake.laws.measurement_errors import write_errors
 from coop_drake.laws.sampling import period_of
-from coop_drake.systems.block import VECTOR, Block
+from coop_drake.systems.block import Block
 from coop_drake.tree.pose import FloatArray
 
 
@@ -42,7 +43,7 @@ class MeasurementNoise(Block):
             )
         self._period, n = period, len(deviations)
         known = [seed, np.array(deviations, dtype=float), np.array(waves, dtype=float)]
-        self._errors, self._write = np.empty(n), prepared(write_errors, known, 0, VECTOR)
+        self._errors, self._write = np.empty(n), partial(write_errors, *known)
         self._exact = self.DeclareVectorInputPort("exact", n)
         self.DeclareVectorOutputPort("measured", n, self._write_measured)
 

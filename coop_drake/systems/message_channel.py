@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 from pydrake.systems.framework import BasicVector, Context, DiscreteValues
 from pydrake.systems.primitives import LinearSystem
 
-from coop_drake.compiled import prepared
 from coop_drake.laws.channels import NOTHING, carry_reports, channel_rows
 from coop_drake.laws.random_draws import uniform_pair
 from coop_drake.laws.sampling import period_of, whole_periods
-from coop_drake.systems.block import VECTOR, Block
+from coop_drake.systems.block import Block
 from coop_drake.systems.current_cell import READY_SIZE
 
 
@@ -49,11 +50,10 @@ class MessageChannel(Block):
         if not (0.0 <= loss <= 1.0 and 0.0 <= repeat <= 1.0):
             raise ValueError(f"MessageChannel's probabilities must lie in [0, 1], not {loss} and {repeat}")
         self._period, self._loss, self._repeat = period, loss, repeat
-        self._draw = prepared(uniform_pair, [seed], 0)
+        self._draw = partial(uniform_pair, seed)
         self._delay = whole_periods(delay, period)
         self._sent = self.DeclareVectorInputPort("sent", READY_SIZE)
         kept = np.full((channel_rows(self._delay), READY_SIZE), NOTHING)
-        self._carry = prepared(carry_reports, (), kept, VECTOR, True, False, self._delay, kept)
         self.DeclareDiscreteState(kept.ravel())
         self.DeclareVectorOutputPort("heard", READY_SIZE, self._write_heard, {self.xd_ticket()})
         self.DeclarePeriodicDiscreteUpdateEvent(period_sec=period, offset_sec=0.0, update=self._transmit)
@@ -61,7 +61,7 @@ class MessageChannel(Block):
     def _transmit(self, context: Context, discrete_state: DiscreteValues) -> None:
         kept = context.get_discrete_state_vector().value().reshape(-1, READY_SIZE)
         arrivals = discrete_state.get_mutable_vector().get_mutable_value().reshape(-1, READY_SIZE)
-        self._carry(kept, self._sent.Eval(context), *self._thrown(context), self._delay, arrivals)
+        carry_reports(kept, self._sent.Eval(context), *self._thrown(context), self._delay, arrivals)
 
     def _thrown(self, context: Context) -> tuple[bool, bool]:
         """Return whether a report arrives, and whether it is repeated, drawn with their probabilities."""

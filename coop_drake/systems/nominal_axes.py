@@ -8,9 +8,8 @@ import numpy as np
 from pydrake.systems.framework import BasicVector, Context, DiscreteValues, EventStatus
 
 from coop_drake.answers.axis_tracking import AxisTracking
-from coop_drake.compiled import prepared
 from coop_drake.laws.nominal_axes import carry_axes, place_on_axes, pull_axes
-from coop_drake.systems.block import NUMBER, VECTOR, Block
+from coop_drake.systems.block import Block
 from coop_drake.tree.pose import FloatArray
 
 
@@ -67,10 +66,6 @@ class NominalAxes(Block):
         super().__init__()
         axes = motion.start.size
         self._motion, self._gains = motion, (motion.tracking.stiffness, motion.tracking.damping)
-        rows = np.empty((3, axes))
-        self._carry = prepared(carry_axes, (), rows, VECTOR, NUMBER, NUMBER, rows)
-        self._place = prepared(place_on_axes, (), rows, VECTOR, VECTOR)
-        self._pull = prepared(pull_axes, (), VECTOR, VECTOR, VECTOR, rows[:2], self._gains, VECTOR)
         self._object = self.DeclareVectorInputPort("object_state", 6)
         self._robot = self.DeclareVectorInputPort("robot_state", 2 * (2 + axes))
         self._law = self.DeclareVectorInputPort("axis_acceleration", axes)
@@ -104,7 +99,7 @@ class NominalAxes(Block):
         """Return x^, x^' and a^ half a period and a lag later, shape (3, 1 + n)."""
         later, motion = np.empty((3, self._motion.start.size)), self._motion
         time = 0.5 * motion.period + motion.lag
-        self._carry(self.states_of(context)[:3], self._law.Eval(context), time, motion.lag, later)
+        carry_axes(self.states_of(context)[:3], self._law.Eval(context), time, motion.lag, later)
         return later
 
     def _write_object(self, context: Context, output: BasicVector) -> None:
@@ -127,7 +122,7 @@ class NominalAxes(Block):
     def _show_robot(self, context: Context, states: FloatArray, output: BasicVector) -> None:
         shown = output.get_mutable_value()
         shown[:] = self._robot.Eval(context)
-        self._place(states, self._motion.mounting, shown)
+        place_on_axes(states, self._motion.mounting, shown)
 
     def _write_axes(self, context: Context, output: BasicVector) -> None:
         output.SetFromVector(self.states_of(context)[:2].ravel())
@@ -136,12 +131,12 @@ class NominalAxes(Block):
         states, law, seen = self.states_of(context), self._law.Eval(context), self._object.Eval(context)
         expected = states[-2:] if self._motion.measurement_periods else states[:2]
         robot = self._robot.Eval(context) if states.shape[1] > 1 else seen
-        self._pull(law, seen, robot, expected, self._gains, output.get_mutable_value())
+        pull_axes(law, seen, robot, expected, self._gains, output.get_mutable_value())
 
     def _step(self, context: Context, discrete_state: DiscreteValues) -> EventStatus:
         motion, states = self._motion, self.states_of(context)
         following = discrete_state.get_mutable_vector().get_mutable_value().reshape(states.shape)
-        self._carry(states[:3], self._law.Eval(context), motion.period, motion.lag, following[:3])
+        carry_axes(states[:3], self._law.Eval(context), motion.period, motion.lag, following[:3])
         if motion.measurement_periods:
             following[3:5], following[5:] = states[:2], states[3:-2]
         return EventStatus.Succeeded()

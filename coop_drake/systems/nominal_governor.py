@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from pydrake.systems.framework import BasicVector, Context, DiscreteValues, EventStatus
 
 from coop_drake.answers.position_tube import PositionTube
-from coop_drake.compiled import prepared
 from coop_drake.harmonic_maps import VelocityField
 from coop_drake.laws.nominal import nominal_flow
-from coop_drake.systems.block import NUMBER, VECTOR, Block
+from coop_drake.systems.block import Block
 from coop_drake.systems.current_cell import CURRENT_CELL_SIZE, index_of
 from coop_drake.systems.funnel_clock import CLOCK_SIZE, clock_of
 from coop_drake.systems.nominal_kernels import (
@@ -96,11 +96,11 @@ class NominalGovernor(Block):
         self._motion = motion
         self._steps = [_prepared_step(cell, flow, motion) for cell in cells]
         tracking = motion.tracking_row(cells[0])
-        self._accelerate = prepared(accelerate_along, [tracking], VECTOR, VECTOR, VECTOR, VECTOR, VECTOR)
+        self._accelerate = partial(accelerate_along, tracking)
         regions = [(cell.clearance.edges, gains.stiffness) for cell in cells]
-        self._margins = [prepared(nominal_margin, region, VECTOR) for region in regions]
+        self._margins = [partial(nominal_margin, *region) for region in regions]
         self._shows = [
-            prepared(show_nominal, (*region, target, *_reports_of(motion)), VECTOR, VECTOR)
+            partial(show_nominal, *region, target, *_reports_of(motion))
             for region, target in zip(regions, motion.targets, strict=True)
         ]
         self._object = self.DeclareVectorInputPort("object_state", 6)
@@ -170,4 +170,4 @@ def _prepared_step(
     if not isinstance(cell.field, VelocityField):
         raise TypeError("NominalGovernor needs the velocity fields of harmonic maps")
     known = cell.row, cell.clearance.edges, *cell.field.kernel_arguments, flow
-    return prepared(step_nominal, (*known, motion.period, motion.tube.speed), NUMBER, VECTOR, VECTOR)
+    return partial(step_nominal, *known, motion.period, motion.tube.speed)

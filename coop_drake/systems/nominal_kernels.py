@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from coop_drake.compiled import compiled
 from coop_drake.geometry.boundary import signed_distance
 from coop_drake.harmonic_maps.field import velocity_in_field
+from coop_drake.jit import compiled
 from coop_drake.laws.governor import energy_margin, governor_velocity, tracking_energy
 from coop_drake.laws.hand_over import GOVERNOR_GAIN, SMOOTHING, STIFFNESS
 from coop_drake.laws.nominal import excursion, limited_step, reach_of, tracked_acceleration
@@ -23,7 +23,7 @@ STATE_SIZE = 6
 """Numbers of its state that change with every step: p^ (2) [m], p^' (2) [m/s], p_G (2) [m]."""
 
 
-@compiled
+@compiled(borrows=True)
 def nominal_room(edges: FloatArray, stiffness: float, nominal: FloatArray, governor: FloatArray) -> float:
     """Return d - a of a region, the distance that p_G has left for its next steps [m].
 
@@ -36,14 +36,14 @@ def nominal_room(edges: FloatArray, stiffness: float, nominal: FloatArray, gover
     return _room_at(signed_distance(edges, governor[0], governor[1]), stiffness, nominal, governor)
 
 
-@compiled
+@compiled(borrows=True)
 def _room_at(distance: float, stiffness: float, nominal: FloatArray, governor: FloatArray) -> float:
     """Return ``nominal_room`` where the distance of p_G to the region's boundary is known."""
     x, y = nominal[0] - governor[0], nominal[1] - governor[1]
     return distance - excursion(x, y, nominal[2], nominal[3], stiffness)
 
 
-@compiled
+@compiled(borrows=True)
 def nominal_margin(edges: FloatArray, stiffness: float, state: FloatArray) -> float:
     """Return Delta E of (15) with p^ in place of p [m^2/s^2].
 
@@ -55,14 +55,14 @@ def nominal_margin(edges: FloatArray, stiffness: float, state: FloatArray) -> fl
     return _margin_at(signed_distance(edges, state[4], state[5]), stiffness, state)
 
 
-@compiled
+@compiled(borrows=True)
 def _margin_at(distance: float, stiffness: float, state: FloatArray) -> float:
     """Return ``nominal_margin`` where the distance of p_G to the region's boundary is known."""
     energy = tracking_energy(state[0] - state[4], state[1] - state[5], state[2], state[3], stiffness)
     return energy_margin(energy, distance, stiffness)
 
 
-@compiled
+@compiled(borrows=True)
 def step_nominal(
     row: FloatArray, edges: FloatArray, flat: FloatArray, field: FloatArray, flow: FloatArray,
     period: float, speed: float, pace: float, state: FloatArray, following: FloatArray,
@@ -97,7 +97,7 @@ def step_nominal(
         following[5] += dy
 
 
-@compiled
+@compiled(borrows=True)
 def accelerate_along(
     gains: FloatArray, object_state: FloatArray, governor: FloatArray, nominal: FloatArray,
     expected: FloatArray, acceleration: FloatArray,
@@ -123,7 +123,7 @@ def accelerate_along(
         )
 
 
-@compiled
+@compiled(borrows=True)
 def show_nominal(
     edges: FloatArray, stiffness: float, target: FloatArray, period: float, periods: float, speed: float,
     state: FloatArray, shown: FloatArray,
@@ -147,7 +147,7 @@ def show_nominal(
     shown[5] = reach_of(distance, period, periods, speed)
 
 
-@compiled
+@compiled(borrows=True)
 def nominal_ready(
     next_edges: FloatArray, next_stiffness: float, nominal: FloatArray, governor: FloatArray
 ) -> float:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 from pydrake.systems.framework import BasicVector, Context
 
-from coop_drake.compiled import prepared
 from coop_drake.laws.robot_dynamics import estimate_object
 from coop_drake.plant import RobotPlant, robot_chain
-from coop_drake.systems.block import VECTOR, Block
+from coop_drake.systems.block import Block
 from coop_drake.tree.pose import FloatArray
 
 
@@ -31,7 +32,7 @@ class ObjectEstimator(Block):
     def __init__(self, robot: RobotPlant, p_LE: FloatArray) -> None:
         super().__init__()
         known = robot_chain(robot), np.array(p_LE, dtype=float)
-        self._estimate = prepared(estimate_object, known, VECTOR, VECTOR, VECTOR)
+        self._estimate = partial(estimate_object, *known)
         self._state = self.DeclareVectorInputPort("robot_state", 2 * (3 + len(robot.joints)))
         self._pose = self.DeclareVectorInputPort("object_pose", 3)
         self.DeclareVectorOutputPort("object_state", 6, self._write_state)

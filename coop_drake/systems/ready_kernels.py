@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from coop_drake.compiled import compiled
+from coop_drake.jit import compiled
 from coop_drake.laws.axis_table import LEAVING_TIME
 from coop_drake.laws.hand_over import governed_gains
 from coop_drake.laws.readiness import (
@@ -83,7 +83,7 @@ def ready_conditions(
     ]
 
 
-@compiled
+@compiled(borrows=True)
 def robot_ready(
     table: FloatArray,
     next_table: FloatArray,
@@ -126,7 +126,7 @@ def robot_ready(
     return min(margin, axes_ready(table, next_table, last, time, object_state, robot))
 
 
-@compiled
+@compiled(borrows=True)
 def robot_ready_along(
     table: FloatArray, next_table: FloatArray, next_edges: FloatArray, next_stiffness: float,
     inradius: float, goal: FloatArray, tolerance: float, last: bool, time: float, object_state: FloatArray,
@@ -153,7 +153,7 @@ def robot_ready_along(
     return min(margin, axes_ready(table, next_table, last, time, object_state, robot))
 
 
-@compiled
+@compiled(borrows=True)
 def robot_arrived(
     table: FloatArray, goal: FloatArray, tolerance: float, axes_led: bool, object_state: FloatArray,
     robot: FloatArray, nominal: FloatArray, arrival: float,
@@ -185,7 +185,7 @@ def robot_arrived(
     return margin
 
 
-@compiled
+@compiled(borrows=True)
 def axes_ready(
     table: FloatArray,
     next_table: FloatArray,

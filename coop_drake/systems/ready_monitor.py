@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 
 from pydrake.systems.framework import BasicVector, Context
 
-from coop_drake.compiled import prepared
 from coop_drake.laws.departure import quiet_margin
 from coop_drake.systems.axis_laws import AxisLaw
-from coop_drake.systems.block import NUMBER, VECTOR, Block
+from coop_drake.systems.block import Block
 from coop_drake.systems.current_cell import CURRENT_CELL_SIZE, READY_SIZE, index_of
 from coop_drake.systems.departure_monitor import ALARM_SIZE
 from coop_drake.systems.nominal_kernels import NOMINAL_SIZE, NOTHING
@@ -79,8 +79,8 @@ class ReadyMonitor(Block):
             goal_position,
             position_tolerance,
         )
-        law, more = (robot_ready_along, [VECTOR]) if nominal else (robot_ready, [])
-        self._ready = [prepared(law, known, NUMBER, VECTOR, VECTOR, VECTOR, *more) for known in conditions]
+        law = robot_ready_along if nominal else robot_ready
+        self._ready = [partial(law, *known) for known in conditions]
         n = laws[0].axes - 1
         self._object = self.DeclareVectorInputPort("object_state", 6)
         self._state = self.DeclareVectorInputPort("robot_state", 2 * (3 + n))
@@ -91,7 +91,7 @@ class ReadyMonitor(Block):
         self._arrival = self.DeclareVectorInputPort("arrival", 1) if measured else None
         last = conditions[-1]
         known = last.table, last.goal, last.tolerance, axes_led
-        self._arrived = prepared(robot_arrived, known, VECTOR, VECTOR, VECTOR, NUMBER)
+        self._arrived = partial(robot_arrived, *known)
         self.DeclareVectorOutputPort("ready", READY_SIZE, self._write_ready)
 
     def _write_ready(self, context: Context, output: BasicVector) -> None:

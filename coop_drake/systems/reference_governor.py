@@ -4,17 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 
 from pydrake.systems.framework import BasicVector, Context
 
-from coop_drake.compiled import prepared
 from coop_drake.geometry.boundary import BoundaryDistance
 from coop_drake.harmonic_maps import VelocityField
 from coop_drake.laws.gains import TransitionGains
 from coop_drake.laws.governor import driving_margin, governor_velocity, steady_clearance
 from coop_drake.laws.hand_over import SPEED_LIMIT, governed_gains
-from coop_drake.systems.block import NUMBER, VECTOR, Block
+from coop_drake.systems.block import Block
 from coop_drake.systems.current_cell import CURRENT_CELL_SIZE, index_of
 from coop_drake.systems.funnel_clock import CLOCK_SIZE
 from coop_drake.systems.governor_kernels import accelerate_object, cell_margin, govern
@@ -49,7 +48,7 @@ class GovernedCell:
         if not isinstance(self.field, VelocityField):
             return self.govern
         known = self.row, self.clearance.edges, *self.field.kernel_arguments
-        return prepared(govern, known, NUMBER, VECTOR, VECTOR, VECTOR)
+        return partial(govern, *known)
 
     def govern(
         self, time: float, object_state: FloatArray, governor_position: FloatArray, command: FloatArray
@@ -101,10 +100,8 @@ class ReferenceGovernor(Block):
         if not cells:
             raise ValueError("ReferenceGovernor needs at least one cell")
         self._govern = [cell.prepared_law() for cell in cells]
-        self._gains = [prepared(governed_gains, [cell.row], NUMBER) for cell in cells]
-        self._margin = [
-            prepared(cell_margin, [cell.clearance.edges], NUMBER, VECTOR, VECTOR) for cell in cells
-        ]
+        self._gains = [partial(governed_gains, cell.row) for cell in cells]
+        self._margin = [partial(cell_margin, cell.clearance.edges) for cell in cells]
         self._object = self.DeclareVectorInputPort("object_state", 6)
         self._governor = self.DeclareVectorInputPort("governor_position", 2)
         self._current = self.DeclareVectorInputPort("current_cell", CURRENT_CELL_SIZE)

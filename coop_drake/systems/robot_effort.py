@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 from pydrake.systems.framework import BasicVector, Context
 
-from coop_drake.compiled import prepared
 from coop_drake.laws.robot_dynamics import robot_effort
 from coop_drake.plant import RobotPlant, robot_chain
-from coop_drake.systems.block import VECTOR, Block
+from coop_drake.systems.block import Block
 
 
 class RobotEffort(Block):
@@ -31,7 +32,7 @@ class RobotEffort(Block):
     def __init__(self, robot: RobotPlant) -> None:
         super().__init__()
         self._robot, self._springs = robot, robot.has_springs
-        self._effort = prepared(robot_effort, [robot_chain(robot)], VECTOR, VECTOR, VECTOR, VECTOR)
+        self._effort = partial(robot_effort, robot_chain(robot))
         self._size = size = 3 + len(robot.joints)
         self._state = self.DeclareVectorInputPort("robot_state", 2 * size)
         self._hand = self.DeclareVectorInputPort("hand_command", 6)

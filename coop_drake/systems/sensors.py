@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 from pydrake.systems.framework import BasicVector, Context
 from pydrake.systems.primitives import Selector
 
-from coop_drake.compiled import compiled, prepared
+from coop_drake.jit import compiled
 from coop_drake.laws.robot_dynamics import read_robot
 from coop_drake.plant import SeparateTeam, TeamPlant, base_chain
-from coop_drake.systems.block import VECTOR, Block
+from coop_drake.systems.block import Block
 from coop_drake.systems.selector import build_selector
 from coop_drake.tree.pose import FloatArray, IntArray
 
 
-@compiled
+@compiled(borrows=True)
 def _read_team(
     pose: IntArray, first: IntArray, chains: FloatArray, yaws: FloatArray, first_joint: IntArray,
     joints: IntArray, state: FloatArray, measured: FloatArray,
@@ -68,7 +70,7 @@ class TeamSensor(Block):
             np.array([0, *np.cumsum([chain.joints.shape[1] for chain in chains])]),
             np.hstack([chain.joints for chain in chains]),
         )
-        self._read = prepared(_read_team, known, VECTOR, VECTOR)
+        self._read = partial(_read_team, *known)
         #: Sizes of the measurements' parts: the object's, then each robot's.
         self.sizes = [3, *(2 * (3 + chain.joints.shape[1]) for chain in chains)]
         self._state = self.DeclareVectorInputPort("team_state", team.plant.num_multibody_states())

@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 from pydrake.systems.framework import BasicVector, Context, DiscreteValues, EventStatus
 
-from coop_drake.compiled import prepared
 from coop_drake.laws.measurement_errors import shift_back
-from coop_drake.systems.block import VECTOR, Block
+from coop_drake.systems.block import Block
 
 
 class ShiftedMeasurement(Block):
@@ -29,7 +28,7 @@ class ShiftedMeasurement(Block):
 
     def __init__(self, size: int, share: float, period: float, offset: float = 0.0) -> None:
         super().__init__()
-        self._share, self._shift = share, prepared(shift_back, (), VECTOR, VECTOR, 0.0)
+        self._share, self._shift = share, shift_back
         self._exact = self.DeclareVectorInputPort("exact", size)
         self.DeclareDiscreteState(np.zeros(size))
         self.DeclareVectorOutputPort("measured", size, self._write_measured)

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 from pydrake.systems.framework import BasicVector, Context
 
-from coop_drake.compiled import prepared
 from coop_drake.laws.sticking import stick, sticking_room
 from coop_drake.laws.team_dynamics import team_work
 from coop_drake.plant.team_tree import TeamTree
-from coop_drake.systems.block import VECTOR, Block
+from coop_drake.systems.block import Block
 from coop_drake.tree.pose import FloatArray, IntArray
 
 
@@ -49,9 +50,7 @@ class Sticking(Block):
         self._given, self._efforts = np.zeros(links + 2), np.zeros(links + 2)
         self._accelerations, self._wrenches = np.empty(links + 2), np.empty((rows, 3))
         known = whole.tree, whole.bases[:rows].copy(), whole.places[:rows].copy()
-        self._stick = prepared(
-            stick, known, VECTOR, VECTOR, VECTOR, 0.0, VECTOR, work, room, VECTOR, self._wrenches
-        )
+        self._stick = partial(stick, *known)
         self._rest, self._friction = (gravity, work, room), np.array(friction)
         self._state = self.DeclareVectorInputPort("team_state", 2 * (links + 2))
         self._torques = self.DeclareVectorInputPort("joint_torques", len(rates))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from coop_drake.compiled import compiled
+from coop_drake.jit import compiled
 from coop_drake.laws.robot_dynamics import read_robot
 from coop_drake.tree.pose import FloatArray, IntArray
 
@@ -31,7 +31,7 @@ class FusedTeam(NamedTuple):
     tracking: FloatArray
 
 
-@compiled
+@compiled(borrows=True)
 def read_own(
     k: int,
     places: IntArray,

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 from pydrake.systems.framework import BasicVector, Context
 
-from coop_drake.compiled import prepared
 from coop_drake.laws.load_sharing import end_effector_command
-from coop_drake.systems.block import VECTOR, Block
+from coop_drake.systems.block import Block
 from coop_drake.tree.pose import FloatArray
 
 
@@ -48,7 +49,7 @@ class WrenchLaw(Block):
         if not 0.0 <= share <= 1.0:
             raise ValueError(f"WrenchLaw's share must lie in [0, 1], not {share}")
         load = np.array([*p_LE, *p_LLcm, mass, inertia, share], dtype=float)
-        self._command = prepared(end_effector_command, [load], VECTOR, VECTOR, VECTOR, VECTOR)
+        self._command = partial(end_effector_command, load)
         self._object = self.DeclareVectorInputPort("object_state", 6)
         self._governor = self.DeclareVectorInputPort("governor_command", 4)
         self._axes = self.DeclareVectorInputPort("axis_acceleration", 1 + joints)

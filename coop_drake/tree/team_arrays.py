@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from coop_drake.compiled import compiled
+from coop_drake.jit import compiled
 from coop_drake.tree.pose import FloatArray, IntArray
 
 if TYPE_CHECKING:
@@ -59,12 +59,18 @@ def place(team: TeamArrays, z: FloatArray) -> FloatArray:
         Rows (x, y, cos(angle), sin(angle), angle), the angle not wrapped, shape (C, 5) [m, rad].
     """
     poses = np.empty((len(team.links), 5))
-    for c in range(len(team.links)):
-        place_component(team, z, c, poses)
+    place_into(team, z, poses)
     return poses
 
 
-@compiled(inlined=True)
+@compiled(borrows=True)
+def place_into(team: TeamArrays, z: FloatArray, poses: FloatArray) -> None:
+    """Write what ``place`` returns into ``poses``."""
+    for c in range(len(team.links)):
+        place_component(team, z, c, poses)
+
+
+@compiled(inlined=True, borrows=True)
 def place_component(team: TeamArrays, z: FloatArray, c: int, poses: FloatArray) -> None:
     """Write the pose of one component, whose parent's pose is there, as ``place`` does.
 

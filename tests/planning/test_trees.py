@@ -61,7 +61,9 @@ def test_samples_of_a_large_team_are_free_more_often_component_by_component(prob
     free = {}
     for tries in (1, 12):
         region = SampledRegion(guide, spread, lower, upper, circular, 0, tries)
-        samples = np.array([draw(team, grid, region, u, 0, 0.0) for u in uniforms])
+        samples, poses = np.empty((SAMPLES, len(lower))), np.empty((len(team.links), 5))
+        for u, sample in zip(uniforms, samples, strict=True):
+            draw(team, grid, region, u, 0, 0.0, sample, poses)
         assert (samples >= lower).all()
         assert (samples <= upper).all()
         free[tries] = sum(is_free(team, grid, z, 0.0) for z in samples)

@@ -14,7 +14,6 @@ from pydrake.systems.framework import BasicVector, Context, DiagramBuilder, Disc
 from pydrake.systems.primitives import Demultiplexer
 
 from coop_drake.answers.log import SimulationLog
-from coop_drake.compiled import compiled, prepared
 from coop_drake.compiled_loop import CompiledTransport
 from coop_drake.compiled_loop.arrays import LoopCells, LoopDepartures, LoopMemory, LoopNominal
 from coop_drake.compiled_loop.departing import believed, departures_of, memory_of, nominal_of
@@ -31,6 +30,7 @@ from coop_drake.diagram.station import (
     _measure,
     tilt_floor,
 )
+from coop_drake.jit import compiled
 from coop_drake.laws.actuators import lag_behind
 from coop_drake.laws.axis_table import write_bounds
 from coop_drake.laws.sampling import period_of
@@ -41,7 +41,6 @@ from coop_drake.scenario import Deployment, Scenario
 from coop_drake.simulation.run import run_and_release
 from coop_drake.simulation.telemetry import Sample
 from coop_drake.systems import Block
-from coop_drake.systems.block import NUMBER, VECTOR
 from coop_drake.systems.departure_monitor import ALARM_SIZE
 from coop_drake.systems.nominal_kernels import nominal_margin
 from coop_drake.systems.team_kernels import FusedTeam, read_own
@@ -149,9 +148,9 @@ class SampledTeam(Block):
         }
         self._efforts = self._parts["efforts"][0]
         shown, bounds = np.empty((self._robots, SHOWN)), np.empty((2, self._axes))
-        self._tell = prepared(tell, known, memory, 0, 0, NUMBER, VECTOR, shown, bounds)
-        self._update = prepared(update, (*known, robot_room(memory)), memory, 0)
-        self._follow = prepared(lag_behind, [lag], NUMBER, VECTOR, VECTOR, VECTOR)
+        self._tell = partial(tell, *known)
+        self._update = partial(update, *known, robot_room(memory))
+        self._follow = partial(lag_behind, lag)
         self._state = self.DeclareVectorInputPort("team_state", memory.state.size)
         start = np.concatenate([[0.0, 0.0], *(part.ravel() for part in kept.values())])
         group = self.discrete_state_ticket(self.DeclareDiscreteState(start))

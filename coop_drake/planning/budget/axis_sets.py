@@ -7,7 +7,7 @@ from math import ceil
 
 import numpy as np
 
-from coop_drake.compiled import compiled
+from coop_drake.jit import compiled
 from coop_drake.laws.axis_table import (
     DECAY_RATE,
     FADING_TIME,
@@ -137,7 +137,7 @@ def axis_sets(row: FloatArray, conditions: AxisConditions, entry: Entry, parts: 
     )
 
 
-@compiled
+@compiled(borrows=True)
 def _closed_part(tube: FloatArray, middle: float) -> tuple[float, float, float, float, float]:
     """Return |x - middle|, |v| and |x''| of the first sample, and the largest of the first two of all."""
     x = v = 0.0

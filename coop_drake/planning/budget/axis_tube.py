@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from coop_drake.compiled import compiled
+from coop_drake.jit import compiled
 from coop_drake.laws.axis_table import FADING_TIME, bounds_of, track_row
 from coop_drake.laws.hand_over import fading
 from coop_drake.laws.nominal_axes import lag_factors
@@ -89,7 +89,7 @@ def follow_tube(
     return True
 
 
-@compiled
+@compiled(borrows=True)
 def _command(
     row: FloatArray, time: float, state: tuple[float, float, float, float], faded: float, memory: FloatArray
 ) -> tuple[float, float, float, float, float]:
@@ -109,7 +109,7 @@ def _command(
     return u, slope, by_rate, rest, abs(u) + abs(slope) * reach + abs(by_rate) * fast + rest
 
 
-@compiled
+@compiled(borrows=True)
 def _note(
     sample: FloatArray,
     row: FloatArray,
@@ -132,7 +132,7 @@ def _note(
     sample[DISTANCE] = nearest - 0.125 * period * period * (fastest + bent)
 
 
-@compiled(reassociate=True)
+@compiled(reassociate=True, borrows=True)
 def _respond(
     responses: FloatArray,
     weight: FloatArray,

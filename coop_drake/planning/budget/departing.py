@@ -19,7 +19,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from coop_drake.compiled import compiled
+from coop_drake.jit import compiled
 from coop_drake.laws.nominal_axes import lag_factors
 from coop_drake.planning.budget.alarms import axis_errors
 from coop_drake.planning.budget.axis_departure import LATE, AxisLoop
@@ -136,7 +136,7 @@ def moving_evenly(loop: AxisLoop, coupling: FloatArray, moving: tuple[float, flo
     return Departures(*(one.max(axis=0) for one in found))
 
 
-@compiled
+@compiled(borrows=True)
 def _rate_terms(coupling: FloatArray, rates: FloatArray) -> float:
     """Return c, the largest acceleration of one axis because of rates up to these [rad/s^2 or m/s^2]."""
     total = 0.0
@@ -146,7 +146,7 @@ def _rate_terms(coupling: FloatArray, rates: FloatArray) -> float:
     return total
 
 
-@compiled(reassociate=True)
+@compiled(reassociate=True, borrows=True)
 def _answers(kicks: FloatArray, entered: FloatArray, first: FloatArray) -> tuple[float, float, float, float]:
     """Return the sums of the sizes of the responses times what entered, of x, x' and the pull.
 
@@ -216,7 +216,7 @@ def _carry(
     _join(found, found[:1, ever], ever - 1)
 
 
-@compiled
+@compiled(borrows=True)
 def _join(found: FloatArray, following: FloatArray, k: int) -> None:
     """Add to the departures of a period those at its end, shape (parts, axes)."""
     for i in range(following.shape[1]):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from coop_drake.compiled import compiled
+from coop_drake.jit import compiled
 from coop_drake.laws.axis_table import bounds_of
 from coop_drake.laws.ppc import track_axis, track_distances
 from coop_drake.laws.slopes import gains_of, saturated, slopes_between
@@ -28,7 +28,7 @@ def law_memory() -> FloatArray:
     return np.empty((8, PIECES + 1))
 
 
-@compiled
+@compiled(borrows=True)
 def fit_law(
     row: FloatArray, time: float, position: float, reach: float, rate: float, memory: FloatArray
 ) -> tuple[float, float, float, float]:
@@ -65,7 +65,7 @@ def fit_law(
     return slope, 0.5 * (v_least + v_most), rest, 0.5 * (v_most - v_least)
 
 
-@compiled
+@compiled(borrows=True)
 def _tabulate(
     bounds: tuple[float, float, float, float, float, float],
     gains: tuple[float, float, float, float, float],

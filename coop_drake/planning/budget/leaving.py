@@ -7,7 +7,7 @@ from math import ceil
 
 import numpy as np
 
-from coop_drake.compiled import compiled
+from coop_drake.jit import compiled
 from coop_drake.laws.axis_table import (
     GOAL_LOWER,
     GOAL_UPPER,
@@ -77,14 +77,14 @@ def first_leaving(table: FloatArray, every: Sequence[AxisSets], period: float) -
     return max(stay, first - EARLIER)
 
 
-@compiled
+@compiled(borrows=True)
 def _rests(sample: FloatArray, middle: float, rest: tuple[float, float]) -> bool:
     """Return whether a motion can be at rest at a sample of a tube."""
     near = abs(sample[X] - middle) <= rest[0] + sample[X_REACH]
     return bool(near and abs(sample[V]) <= rest[1] + sample[V_REACH])
 
 
-@compiled
+@compiled(borrows=True)
 def _first_rest(tube: FloatArray, middle: float, rest: tuple[float, float], first: int) -> int:
     """Return the first sample of a tube from another one on at which a motion can be at rest, or its end."""
     for k in range(first, len(tube)):
@@ -93,7 +93,7 @@ def _first_rest(tube: FloatArray, middle: float, rest: tuple[float, float], firs
     return max(first, len(tube))
 
 
-@compiled
+@compiled(borrows=True)
 def _limit(bounds: FloatArray, middle: float, rest: tuple[float, float], time: float) -> None:
     """Cut bounds of states to where a motion can be that was at rest some time ago."""
     farther = rest[0] + time * (rest[1] + 0.5 * time * bounds[5])

@@ -30,7 +30,7 @@ from scipy.linalg import expm
 
 from coop_drake.answers.budget import Budget
 from coop_drake.answers.position_tube import PositionTube
-from coop_drake.compiled import compiled
+from coop_drake.jit import compiled
 from coop_drake.laws.sampling import whole_periods
 from coop_drake.tree.pose import FloatArray
 

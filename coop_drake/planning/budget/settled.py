@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from coop_drake.compiled import compiled
+from coop_drake.jit import compiled
 from coop_drake.laws.axis_table import (
     GOAL_LOWER,
     GOAL_UPPER,
@@ -100,7 +100,7 @@ def settle(
     return Settled(-1.0, np.inf, np.inf, np.inf)
 
 
-@compiled
+@compiled(borrows=True)
 def tail_samples(row: FloatArray, conditions: AxisConditions) -> int:
     """Return for how many samples an axis is followed after its funnel is closed, ``TIME_CONSTANTS`` long."""
     middle = 0.5 * (row[GOAL_LOWER] + row[GOAL_UPPER])

@@ -8,7 +8,7 @@ from itertools import takewhile
 import numpy as np
 
 from coop_drake.answers.problem import PlanningProblem
-from coop_drake.compiled import compiled
+from coop_drake.jit import compiled
 from coop_drake.planning.questions import SMALLEST_MARGIN, marginal_workspace
 from coop_drake.planning.sampling.collision import (
     FAR,
@@ -29,7 +29,7 @@ from coop_drake.planning.sampling.sampler import (
 from coop_drake.tree.component_tree import ComponentTree
 from coop_drake.tree.levers import configuration_scale
 from coop_drake.tree.pose import FloatArray
-from coop_drake.tree.team_arrays import TeamArrays, place
+from coop_drake.tree.team_arrays import TeamArrays, place_into
 
 # Compiled elastic-band smoothing: paths become shorter in every axis and move away from obstacles.
 
@@ -37,10 +37,12 @@ STRIDES = (7, 3, 5, 1, 6, 2, 4, 0)
 """Order in which the samples of a move are checked, each offset with every eighth sample after it."""
 
 
-@compiled
-def _price(team: TeamArrays, grid: ObstacleGrid, z: FloatArray, gap: float, rate: FloatArray) -> float:
+@compiled(borrows=True)
+def _price(
+    team: TeamArrays, grid: ObstacleGrid, z: FloatArray, gap: float, rate: FloatArray, poses: FloatArray
+) -> float:
     """Cost of a sample: rate[0] / (rate[1] + min(clearance, rate[2])), infinite where it is not free."""
-    poses = place(team, z)
+    place_into(team, z, poses)
     clearance = team_clearance(team, grid, poses, rate[2])
     if clearance <= 0.0 or not bodies_apart(team, poses, gap):
         return np.inf
@@ -81,10 +83,10 @@ def improve(
     """
     path = path.copy()
     count, size = path.shape
-    cost = np.empty(count)
+    cost, poses = np.empty(count), np.empty((len(team.links), 5))
     least = rate[0] / (rate[1] + rate[2])
     for k in range(count):
-        cost[k] = _price(team, grid, path[k], gap, rate)
+        cost[k] = _price(team, grid, path[k], gap, rate, poses)
     fresh = np.empty((count, size))
     fresh_cost = np.empty(count)
     for row in range(len(uniforms)):
@@ -128,7 +130,7 @@ def improve(
             for k in range(i + 1 + first, j, len(STRIDES)):
                 if change >= -1e-9:
                     break
-                fresh_cost[k] = _price(team, grid, fresh[k], gap, rate)
+                fresh_cost[k] = _price(team, grid, fresh[k], gap, rate, poses)
                 change += fresh_cost[k] - least
         if change < -1e-9:
             for k in range(i + 1, j):
@@ -150,9 +152,10 @@ def clearances(team: TeamArrays, grid: ObstacleGrid, path: FloatArray, most: flo
     Returns:
         Distances, shape (m,) [m].
     """
-    result = np.empty(len(path))
+    result, poses = np.empty(len(path)), np.empty((len(team.links), 5))
     for k in range(len(path)):
-        result[k] = team_clearance(team, grid, place(team, path[k]), most)
+        place_into(team, path[k], poses)
+        result[k] = team_clearance(team, grid, poses, most)
     return result
 
 

@@ -13,7 +13,6 @@ from typing import NamedTuple
 import numpy as np
 from shapely import MultiPolygon, Polygon
 
-from coop_drake.compiled import compiled
 from coop_drake.geometry.convex import following
 from coop_drake.geometry.distances import (
     meets_ring,
@@ -24,8 +23,9 @@ from coop_drake.geometry.distances import (
 )
 from coop_drake.geometry.minkowski import FreeSpace
 from coop_drake.geometry.parts import polygon_rings
+from coop_drake.jit import compiled
 from coop_drake.tree.pose import FloatArray, IntArray
-from coop_drake.tree.team_arrays import TeamArrays, place
+from coop_drake.tree.team_arrays import TeamArrays, place_into
 
 # Samples added to a path, so that neighbours are near to each other.
 
@@ -125,7 +125,7 @@ def lay_grid(rings: Sequence[FloatArray], reach: float) -> ObstacleGrid:
     return ObstacleGrid(edges, corner, side, rows, columns, reach, first, listed, away, inside)
 
 
-@compiled
+@compiled(borrows=True)
 def square_at(grid: ObstacleGrid, x: float, y: float) -> tuple[int, int]:
     """Column and row of the square that holds a point, -1 for both if none does."""
     column, row = np.floor((x - grid.corner[0]) / grid.side), np.floor((y - grid.corner[1]) / grid.side)
@@ -237,7 +237,7 @@ def grid_inside(workspace: Polygon | MultiPolygon, reach: float) -> ObstacleGrid
 # They guide the search; proofs use them on over-sweeps only, in ``boxes``.
 
 
-@compiled(inlined=True)
+@compiled(inlined=True, borrows=True)
 def ring_clearance(
     grid: ObstacleGrid,
     vertices: FloatArray,
@@ -297,7 +297,7 @@ def ring_clearance(
     return best if inside else -1.0
 
 
-@compiled
+@compiled(borrows=True)
 def _apart(team: TeamArrays, poses: FloatArray, a: int, b: int, gap: float) -> bool:
     """Whether the line of an edge of b, or b's outline if a is a disc, shows that a keeps the gap from b."""
     A, B = team.pieces[a, 0], team.pieces[b, 0]
@@ -331,7 +331,7 @@ def _apart(team: TeamArrays, poses: FloatArray, a: int, b: int, gap: float) -> b
     return apart
 
 
-@compiled
+@compiled(borrows=True)
 def _far(team: TeamArrays, poses: FloatArray, a: int, b: int, gap: float) -> bool:
     """Whether the discs about two pieces keep the gap already."""
     A, B, discs = team.pieces[a, 0], team.pieces[b, 0], team.discs
@@ -343,14 +343,14 @@ def _far(team: TeamArrays, poses: FloatArray, a: int, b: int, gap: float) -> boo
     return far
 
 
-@compiled(inlined=True)
+@compiled(inlined=True, borrows=True)
 def _pair_apart(team: TeamArrays, poses: FloatArray, k: int, gap: float) -> bool:
     """Whether the two pieces of a pair keep the gap."""
     a, b = team.pairs[k, 0], team.pairs[k, 1]
     return _far(team, poses, a, b, gap) or _apart(team, poses, a, b, gap) or _apart(team, poses, b, a, gap)
 
 
-@compiled
+@compiled(borrows=True)
 def bodies_apart(team: TeamArrays, poses: FloatArray, gap: float) -> bool:
     """Whether no two bodies come closer than the gap."""
     k = 0
@@ -359,7 +359,7 @@ def bodies_apart(team: TeamArrays, poses: FloatArray, gap: float) -> bool:
     return k == len(team.pairs)
 
 
-@compiled(inlined=True)
+@compiled(inlined=True, borrows=True)
 def _piece_clearance(
     team: TeamArrays, grid: ObstacleGrid, poses: FloatArray, piece: int, most: float
 ) -> float:
@@ -371,7 +371,7 @@ def _piece_clearance(
     )  # fmt: skip
 
 
-@compiled
+@compiled(borrows=True)
 def team_clearance(team: TeamArrays, grid: ObstacleGrid, poses: FloatArray, most: float) -> float:
     """Distance of the team from the obstacles, at most ``most``; -1 where it meets one or a piece is outside.
 
@@ -389,7 +389,7 @@ def team_clearance(team: TeamArrays, grid: ObstacleGrid, poses: FloatArray, most
     return best
 
 
-@compiled
+@compiled(borrows=True)
 def component_is_free(
     team: TeamArrays, grid: ObstacleGrid, poses: FloatArray, component: int, gap: float
 ) -> bool:
@@ -414,11 +414,19 @@ def is_free(team: TeamArrays, grid: ObstacleGrid, z: FloatArray, gap: float) -> 
         z: (x, y, theta, q...), shape (3 + n,).
         gap: Distance that pairs of bodies must keep [m].
     """
-    poses = place(team, z)
+    return is_free_placed(team, grid, z, gap, np.empty((len(team.links), 5)))
+
+
+@compiled(borrows=True)
+def is_free_placed(
+    team: TeamArrays, grid: ObstacleGrid, z: FloatArray, gap: float, poses: FloatArray
+) -> bool:
+    """As ``is_free``, with room for the poses of all components, shape (C, 5)."""
+    place_into(team, z, poses)
     return team_clearance(team, grid, poses, 0.0) >= 0.0 and bodies_apart(team, poses, gap)
 
 
-@compiled
+@compiled(borrows=True)
 def first_collision(team: TeamArrays, grid: ObstacleGrid, path: FloatArray, gap: float) -> int:
     """Index of the first configuration of a path, shape (m, 3 + n), that is not free; m if all of them are.
 
@@ -430,7 +438,7 @@ def first_collision(team: TeamArrays, grid: ObstacleGrid, path: FloatArray, gap:
     return len(path)
 
 
-@compiled
+@compiled(borrows=True)
 def segment_is_free(
     team: TeamArrays,
     grid: ObstacleGrid,
@@ -439,6 +447,8 @@ def segment_is_free(
     gap: float,
     scale: FloatArray,
     step: float,
+    z: FloatArray,
+    poses: FloatArray,
 ) -> float:
     """Fraction of a straight segment that is free, up to the last configuration checked before a collision.
 
@@ -450,15 +460,16 @@ def segment_is_free(
         gap: Distance that pairs of bodies must keep [m].
         scale: How far a unit of each axis moves the team, shape (d,).
         step: Distance between checks [m].
+        z: Room for a configuration, shape (d,).
+        poses: Room for the poses of all components, shape (C, 5).
     """
     length = 0.0
     for k in range(len(first)):
         length = max(length, abs(last[k] - first[k]) * scale[k])
     count = max(1, int(np.ceil(length / step)))
-    z = np.empty(len(first))
     for i in range(1, count + 1):
         for k in range(len(z)):
             z[k] = first[k] + (last[k] - first[k]) * (i / count)
-        if not is_free(team, grid, z, gap):
+        if not is_free_placed(team, grid, z, gap, poses):
             return (i - 1) / count
     return 1.0

@@ -9,8 +9,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from coop_drake.compiled import compiled
-from coop_drake.planning.sampling.collision import ObstacleGrid, component_is_free, is_free, segment_is_free
+from coop_drake.jit import compiled
+from coop_drake.planning.sampling.collision import (
+    ObstacleGrid,
+    component_is_free,
+    is_free_placed,
+    segment_is_free,
+)
 from coop_drake.tree.pose import FloatArray, IntArray
 from coop_drake.tree.team_arrays import TeamArrays, place_component
 
@@ -57,7 +62,7 @@ def empty_tree(capacity: int, lower: FloatArray, upper: FloatArray, circular: ND
     )  # fmt: skip
 
 
-@compiled
+@compiled(borrows=True)
 def _place_of(tree: Tree, z: FloatArray) -> tuple[int, int, float]:
     """Column and row of the square nearest to a position, and theta counted in parts of a turn."""
     columns = len(tree.latest) // tree.rows
@@ -67,7 +72,7 @@ def _place_of(tree: Tree, z: FloatArray) -> tuple[int, int, float]:
     return column, row, (turns - floor(turns)) * _TURNS
 
 
-@compiled
+@compiled(borrows=True)
 def add(tree: Tree, index: int, z: FloatArray, parent: int) -> None:
     """Store a node."""
     column, row, turned = _place_of(tree, z)
@@ -81,7 +86,7 @@ def add(tree: Tree, index: int, z: FloatArray, parent: int) -> None:
     tree.latest[square, part] = index
 
 
-@compiled
+@compiled(borrows=True)
 def _off(tree: Tree, place: int, last: int, axis: int, x: float) -> float:
     """Distance in one axis from a coordinate to a row or column of squares; outer ones go on outwards."""
     low = tree.frame[axis] + place * tree.frame[2]
@@ -90,7 +95,7 @@ def _off(tree: Tree, place: int, last: int, axis: int, x: float) -> float:
     return max(x - low - tree.frame[2], 0.0) if place < last else 0.0
 
 
-@compiled
+@compiled(borrows=True)
 def _nearest_in(
     tree: Tree, node: int, z: FloatArray, scale: FloatArray, best: float, index: int
 ) -> tuple[float, int]:
@@ -110,7 +115,7 @@ def _nearest_in(
     return best, index
 
 
-@compiled
+@compiled(borrows=True)
 def nearest(tree: Tree, z: FloatArray, scale: FloatArray) -> int:
     """Index of the node nearest to z; circular axes are periodic, theta (axis 2) among them.
 
@@ -204,7 +209,7 @@ class SampledRegion(NamedTuple):
     tries: int
 
 
-@compiled
+@compiled(borrows=True)
 def guide_row(region: SampledRegion, number: float, front: int) -> int:
     """Row of the guide to sample around, for a random number in [0, 1) and the furthest row reached."""
     count = len(region.guide)
@@ -216,7 +221,7 @@ def guide_row(region: SampledRegion, number: float, front: int) -> int:
     return first + int((number - _EVERYWHERE) / (1.0 - _EVERYWHERE) * (last - first))
 
 
-@compiled
+@compiled(borrows=True)
 def furthest_row(region: SampledRegion, front: int, side: int, z: FloatArray) -> int:
     """Furthest row of the guide that the tree of a side has reached, now that it has a node at z."""
     guide = region.guide
@@ -230,7 +235,7 @@ def furthest_row(region: SampledRegion, front: int, side: int, z: FloatArray) ->
     return front
 
 
-@compiled(inlined=True)
+@compiled(inlined=True, borrows=True)
 def _value(region: SampledRegion, u: FloatArray, at: int, k: int, number: float) -> float:
     """Value of an axis for a random number: around the guide, or anywhere on axes without spread.
 
@@ -245,10 +250,11 @@ def _value(region: SampledRegion, u: FloatArray, at: int, k: int, number: float)
     return float(value if k < 2 or region.circular[k] else min(upper, max(lower, value)))
 
 
-@compiled
+@compiled(borrows=True)
 def draw(
-    team: TeamArrays, grid: ObstacleGrid, region: SampledRegion, u: FloatArray, at: int, gap: float
-) -> FloatArray:
+    team: TeamArrays, grid: ObstacleGrid, region: SampledRegion, u: FloatArray, at: int, gap: float,
+    z: FloatArray, poses: FloatArray,
+) -> None:  # fmt: skip
     """Draw one sample whose components, from the object outwards, get other values until they are free.
 
     Few samples of a large team are free otherwise.
@@ -260,14 +266,11 @@ def draw(
         u: Random numbers in [0, 1), shape (2 + d,).
         at: Row of the guide to sample around.
         gap: Distance that pairs of bodies must keep [m].
-
-    Returns:
-        A configuration, which need not be free, shape (d,) [m, rad].
+        z: Receives the configuration, which need not be free, shape (d,) [m, rad].
+        poses: Room for the poses of all components, shape (C, 5).
     """
-    z = np.empty(len(region.lower))
     for k in range(len(z)):
         z[k] = _value(region, u, at, k, u[2 + k])
-    poses = np.empty((len(team.links), 5))
     for component in range(len(team.links) if region.tries > 1 else 0):
         for number in range(1, region.tries + 1):
             place_component(team, z, component, poses)
@@ -278,13 +281,12 @@ def draw(
             for k in range(first, last):
                 step = _STEPS[k if posed else 3]
                 z[k] = _value(region, u, at, k, (u[2 + k] + number * step) % 1.0)
-    return z
 
 
 # Compiled bidirectional random trees: a source of candidate paths, never of proofs.
 
 
-@compiled
+@compiled(borrows=True)
 def _grow(
     team: TeamArrays,
     grid: ObstacleGrid,
@@ -295,11 +297,16 @@ def _grow(
     gap: float,
     scale: FloatArray,
     step: float,
+    room: FloatArray,
+    poses: FloatArray,
 ) -> tuple[int, bool]:
-    """Add a node between the nearest one and z; returns the new number of nodes and whether z was reached."""
+    """Add a node between the nearest one and z; returns the new number of nodes and whether z was reached.
+
+    There is room for configurations in ``room``, shape (3, d), and for poses in ``poses``, shape (C, 5).
+    """
     near = nearest(tree, z, scale)
     length = 0.0
-    move, aim = np.empty(len(z)), np.empty(len(z))
+    move, aim = room[0], room[1]
     for k in range(len(z)):
         move[k] = z[k] - tree.nodes[near, k]
         if tree.circular[k]:
@@ -309,7 +316,7 @@ def _grow(
     fraction = 1.0 if length <= reach else reach / length
     for k in range(len(z)):
         aim[k] = tree.nodes[near, k] + fraction * move[k]
-    passed = segment_is_free(team, grid, tree.nodes[near], aim, gap, scale, step)
+    passed = segment_is_free(team, grid, tree.nodes[near], aim, gap, scale, step, room[2], poses)
     if passed * fraction * length < 0.5 * step and passed < 1.0:
         return count, False
     for k in range(len(z)):
@@ -355,17 +362,22 @@ def connect(
     for side in range(2):
         for k in range(counts[side]):
             add(trees[side], k, start if side == 0 else roots[k], -1)
+    room, poses, drawn = np.empty((3, len(lower))), np.empty((len(team.links), 5)), np.empty(len(lower))
     side, fronts = 0, np.array([0, len(region.guide) - 1])
     for row in range(len(uniforms)):
         at = guide_row(region, uniforms[row, 1], fronts[side])
-        z = draw(team, grid, region, uniforms[row], at, gap)
+        draw(team, grid, region, uniforms[row], at, gap, drawn, poses)
         other = 1 - side
         before = counts[side]
-        counts[side], _ = _grow(team, grid, trees[side], before, z, 40.0 * step, gap, scale, step)
+        counts[side], _ = _grow(
+            team, grid, trees[side], before, drawn, 40.0 * step, gap, scale, step, room, poses
+        )
         if counts[side] > before:
             z = trees[side].nodes[before]
             fronts[side] = furthest_row(region, fronts[side], side, z)
-            counts[other], met = _grow(team, grid, trees[other], counts[other], z, np.inf, gap, scale, step)
+            counts[other], met = _grow(
+                team, grid, trees[other], counts[other], z, np.inf, gap, scale, step, room, poses
+            )
             if met:
                 return _join(trees[0], trees[1], counts), row + 1
         side = other
@@ -395,6 +407,7 @@ def shortened(
     """
     path, part = path.copy(), np.empty(path.shape)
     count, size = path.shape
+    z, poses = np.empty(size), np.empty((len(team.links), 5))
     for row in range(len(uniforms)):
         a, b = int(uniforms[row, 0] * count), int(uniforms[row, 1] * count)
         i, j = min(a, b), max(a, b)
@@ -410,13 +423,13 @@ def shortened(
         stride = 8
         while free and stride > 0:
             for k in range(stride, j - i, 2 * stride if stride < 8 else stride):
-                if not is_free(team, grid, part[k], gap):
+                if not is_free_placed(team, grid, part[k], gap, poses):
                     free = False
                     break
             stride //= 2
         k = 0
         while free and k < j - i:
-            free = segment_is_free(team, grid, part[k], part[k + 1], gap, scale, step) == 1.0
+            free = segment_is_free(team, grid, part[k], part[k + 1], gap, scale, step, z, poses) == 1.0
             k += 1
         for k in range(j - i if free else 0):
             for axis in range(size):
