@@ -42,8 +42,8 @@ class MeasurementNoise(Block):
                 f"length, not {given}"
             )
         self._period, n = period, len(deviations)
-        known = [seed, np.array(deviations, dtype=float), np.array(waves, dtype=float)]
-        self._errors, self._write = np.empty(n), partial(write_errors, *known)
+        sizes = np.array(deviations, dtype=float), np.array(waves, dtype=float)
+        self._errors, self._write = np.empty(n), partial(write_errors, seed, *sizes)
         self._exact = self.DeclareVectorInputPort("exact", n)
         self.DeclareVectorOutputPort("measured", n, self._write_measured)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 
 from pydrake.systems.framework import BasicVector, Context
@@ -91,7 +91,7 @@ class ReadyMonitor(Block):
         self._arrival = self.DeclareVectorInputPort("arrival", 1) if measured else None
         last = conditions[-1]
         known = last.table, last.goal, last.tolerance, axes_led
-        self._arrived = partial(robot_arrived, *known)
+        self._arrived: Callable[..., float] = partial(robot_arrived, *known)
         self.DeclareVectorOutputPort("ready", READY_SIZE, self._write_ready)
 
     def _write_ready(self, context: Context, output: BasicVector) -> None:
