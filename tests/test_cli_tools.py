@@ -58,7 +58,7 @@ def test_an_old_name_says_the_new_one(words, now):
     result = invoke(command, *([f"{part}=3" if part == "--workers" else part] if part else ()), COLUMNS="300")
     assert result.exit_code == 2
     assert result.stdout == ""
-    assert f"`{' '.join(words).strip()}` is now {now}." in " ".join(result.stderr.split())
+    assert f"`{' '.join(words).strip()}` {now}." in " ".join(result.stderr.split())
 
 
 def test_help_keeps_what_stands_in_brackets():

@@ -51,22 +51,22 @@ _PANELS: dict[str, tuple[ModuleType, ...]] = {
 """The modules of all commands, under the headings of the help and in its order."""
 
 _OLD_NAMES: dict[tuple[str, str], str] = {
-    ("keys", ""): "`coop-drake apart keys`",
-    ("world", ""): "`coop-drake apart world`",
-    ("supervisor", ""): "`coop-drake apart supervisor`",
-    ("robot-node", ""): "`coop-drake apart robot`",
-    ("warm", ""): "`coop-drake doctor --warm`",
-    ("maps", "--clear"): "`coop-drake doctor --clear-maps`",
-    ("maps", ""): "`coop-drake doctor --maps`",
-    ("object", ""): "`coop-drake new object`",
-    ("schema", ""): "the file models/scenario.schema.json",
-    ("bench", ""): "`python -m benchmarks`, in a clone of the repository",
-    ("compare", ""): "`coop-drake run` with `plant: {grasps: constraints}` in the scenario",
-    ("plan", "--workers"): "nothing: a plan is made in one process",
-    ("run", "--workers"): "nothing: a plan is made in one process",
-    ("run", "--blocks"): "nothing: every robot has blocks of its own",
-    ("simulate", "--blocks"): "nothing: every robot has blocks of its own",
-    ("campaign", "question"): "`python -m benchmarks question`, in a clone of the repository",
+    ("keys", ""): "is now `coop-drake apart keys`",
+    ("world", ""): "is now `coop-drake apart world`",
+    ("supervisor", ""): "is now `coop-drake apart supervisor`",
+    ("robot-node", ""): "is now `coop-drake apart robot`",
+    ("warm", ""): "is now `coop-drake doctor --warm`",
+    ("maps", "--clear"): "is now `coop-drake doctor --clear-maps`",
+    ("maps", ""): "is now `coop-drake doctor --maps`",
+    ("object", ""): "is now `coop-drake new object`",
+    ("schema", ""): "is now the file models/scenario.schema.json",
+    ("bench", ""): "is now `python -m benchmarks`, in a clone of the repository",
+    ("compare", ""): "is gone: a scenario with `plant: {grasps: constraints}` simulates such grasps",
+    ("plan", "--workers"): "is gone: a plan is made in one process",
+    ("run", "--workers"): "is gone: a plan is made in one process",
+    ("run", "--blocks"): "is gone: every robot has blocks of its own",
+    ("simulate", "--blocks"): "is gone: every robot has blocks of its own",
+    ("campaign", "question"): "is now `python -m benchmarks question`, in a clone of the repository",
 }
 """Commands of before, each alone or with an option or a command below it, and what takes their place."""
 
@@ -81,7 +81,7 @@ class _Commands(TyperGroup):
         words = [word.partition("=")[0] for word in args]
         for (command, part), now in () if ctx.resilient_parsing else _OLD_NAMES.items():
             if words[:1] == [command] and (not part or part in words[1:]):
-                raise _UsageError(f"`{' '.join(filter(None, (command, part)))}` is now {now}.", ctx)
+                raise _UsageError(f"`{' '.join(filter(None, (command, part)))}` {now}.", ctx)
         return super().parse_args(ctx, args)
 
 
