@@ -294,7 +294,7 @@ def question_batches(settings: QuestionSettings) -> Iterator[Batch]:
         yield Batch(0, "planner", first, stop, content_digest(content), f"{__name__}:QUESTIONS")
 
 
-def _tasks(order: dict[str, Any], alive: Callable[[], None]) -> Iterator[Task]:
+def tasks(order: dict[str, Any], alive: Callable[[], None]) -> Iterator[Task]:
     """Yield the questions of a batch that are to be answered; kernels are loaded before their time counts."""
     from benchmarks.study import load_study
 
@@ -306,5 +306,5 @@ def _tasks(order: dict[str, Any], alive: Callable[[], None]) -> Iterator[Task]:
         yield begun_question(settings, number), partial(ask, number, settings, folder.path / CASES)
 
 
-QUESTIONS = Work("questions", QuestionRecord, _tasks)
+QUESTIONS = Work("questions", QuestionRecord, f"{__name__}:tasks")
 """Planning questions."""

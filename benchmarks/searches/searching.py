@@ -524,7 +524,7 @@ class Searching:
         return replace(point, certified=certified, kept=kept, lost=upper, reason=reason)
 
 
-def _tasks(order: dict[str, Any], alive: Callable[[], None]) -> Iterator[Task]:
+def tasks(order: dict[str, Any], alive: Callable[[], None]) -> Iterator[Task]:
     """Yield the searches or bisections of a batch that are to be made."""
     from benchmarks.study import load_study
 
@@ -536,8 +536,8 @@ def _tasks(order: dict[str, Any], alive: Callable[[], None]) -> Iterator[Task]:
         yield searching.begun(index), partial(searching.record, index)
 
 
-SEARCHES = Work("searches", Finding, _tasks)
+SEARCHES = Work("searches", Finding, f"{__name__}:tasks")
 """Searches for runs with small margins."""
 
-BISECTIONS = Work("breaking", BreakingPoint, _tasks)
+BISECTIONS = Work("breaking", BreakingPoint, f"{__name__}:tasks")
 """Bisections of departures."""

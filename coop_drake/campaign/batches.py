@@ -11,15 +11,12 @@ from typing import Any, get_args
 
 from coop_drake.answers.digest import content_digest
 from coop_drake.campaign.plans import Plans, scenario_content
-from coop_drake.campaign.records import Record
+from coop_drake.campaign.records import Record, RunRecord
 from coop_drake.campaign.settings import Tier
 from coop_drake.campaign.variation import Variation
 
 Task = tuple[Record, Callable[[], Record]]
 """The record of a piece of work while it is done, and what does it."""
-
-RUNS = "coop_drake.campaign.running.making:RUNS"
-"""The work of which campaigns consist."""
 
 
 @dataclass(frozen=True)
@@ -29,13 +26,19 @@ class Work:
     Attributes:
         folder: Name of the folder of its files, in that of the results.
         record: What each piece of it leaves: a frozen dataclass of numbers and texts with a ``reason``.
-        tasks: Returns the pieces that an order asks for. It is given the fields of `Order`, with ``begin``
-            for the index of the first piece, and what is to be called now and then in pieces that take long.
+        tasks: Where a function returns the pieces that an order asks for, an iterator of `Task`, as
+            ``module:name``; only the process that does the work imports it. It is given the fields of
+            `Order`, with ``begin`` for the index of the first piece, and what is to be called now and then in
+            pieces that take long.
     """
 
     folder: str
     record: type[Record]
-    tasks: Callable[[dict[str, Any], Callable[[], None]], Iterator[Task]]
+    tasks: str
+
+
+RUNS = Work("runs", RunRecord, "coop_drake.campaign.running.making:tasks")
+"""The work of which campaigns consist: runs of transports."""
 
 
 @dataclass(frozen=True)
@@ -56,7 +59,7 @@ class Batch:
     first: int
     stop: int
     digest: str
-    work: str = RUNS
+    work: str = f"{__name__}:RUNS"
 
     @property
     def record(self) -> type[Record]:

@@ -16,6 +16,7 @@ import tempfile
 import threading
 from dataclasses import asdict
 from functools import partial
+from pkgutil import resolve_name
 from time import process_time
 from typing import Any
 
@@ -45,7 +46,8 @@ def _make(order: dict[str, Any]) -> None:
     from coop_drake.memory import peak_memory_mb
 
     sources = source_digest()  # Before runs are made, because somebody may edit the sources meanwhile.
-    for begun, record in work_of(order["batch"]["work"]).tasks(order, partial(_say, "alive", None)):
+    tasks = resolve_name(work_of(order["batch"]["work"]).tasks)
+    for begun, record in tasks(order, partial(_say, "alive", None)):
         _say("begun", asdict(begun))
         _say("ended", asdict(record()))
     _say("costs", {"cpu_seconds": process_time(), "peak_memory_mb": peak_memory_mb(), "sources": sources})

@@ -12,7 +12,7 @@ from coop_drake.answers.digest import content_digest
 from coop_drake.answers.log import SimulationLog
 from coop_drake.answers.plan import Plan
 from coop_drake.answers.plan_file import plan_digest
-from coop_drake.campaign.batches import Batch, Batching, Task, Work
+from coop_drake.campaign.batches import Batch, Batching, Task
 from coop_drake.campaign.measuring import record_of_log
 from coop_drake.campaign.plans import Maps, Plans, versions
 from coop_drake.campaign.records import RunRecord
@@ -162,7 +162,7 @@ def run_digest(scenario: Scenario, plan: str, tier: Tier, models: str | None = N
     return content_digest({**parts, "versions": versions()})
 
 
-def _tasks(order: dict[str, Any], alive: Callable[[], None]) -> Iterator[Task]:
+def tasks(order: dict[str, Any], alive: Callable[[], None]) -> Iterator[Task]:
     """Yield the runs of a batch that are to be made."""
     folder, batch = CampaignFolder(Path(order["folder"])), order["batch"]
     variation = Variation(load_campaign(folder.campaign, Path(order["campaign"])))
@@ -173,10 +173,6 @@ def _tasks(order: dict[str, Any], alive: Callable[[], None]) -> Iterator[Task]:
     for index in range(order["begin"], batch["stop"]):
         run = variation.run(index)
         yield maker.begun(run), partial(maker.record, run)
-
-
-RUNS = Work("runs", RunRecord, _tasks)
-"""Runs of transports."""
 
 
 def check_unchanged(order: dict[str, Any], batch: Batch) -> None:
