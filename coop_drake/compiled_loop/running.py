@@ -1,12 +1,15 @@
-"""Runs of the compiled loop: one, or many of one transport."""
+"""Runs of the compiled loop: one, or many of one transport, each with departures of its own."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
-from math import nan, sqrt
+from functools import lru_cache
+from math import inf, nan, sqrt
 
-from coop_drake.compiled_loop.departing import believed, departures_of, memory_of, nominal_of
+import numpy as np
+
+from coop_drake.compiled_loop.arrays import LoopDepartures, LoopMemory, LoopNominal
 from coop_drake.compiled_loop.looping import run_loop
 from coop_drake.compiled_loop.preparing import CompiledTransport
 from coop_drake.compiled_loop.watching import (
@@ -41,10 +44,173 @@ from coop_drake.compiled_loop.watching import (
     VALUE,
     WALL,
 )
+from coop_drake.diagram.deployment import (
+    clock_shift,
+    effort_limits,
+    measurement_deviations,
+    measurement_waves,
+    seed_of,
+)
+from coop_drake.diagram.knowledge import report_periods
+from coop_drake.diagram.station import blocked_times, downhill, wheel_slips
+from coop_drake.errors import ScenarioError
+from coop_drake.laws.arrival import mean_samples
+from coop_drake.laws.axis_table import first_jumps
+from coop_drake.laws.chain_motion import INERTIA, MASS
+from coop_drake.laws.channels import NOTHING, channel_rows
 from coop_drake.laws.departure import departing_name
+from coop_drake.laws.nominal import nominal_flow
+from coop_drake.laws.sampling import whole_periods
 from coop_drake.plant.configuration import displacement
 from coop_drake.scenario import Deployment
+from coop_drake.systems.current_cell import READY_SIZE
+from coop_drake.systems.departure_monitor import LONG_AGO
+from coop_drake.systems.team_kernels import FusedTeam
 from coop_drake.tree.pose import FloatArray
+
+_USES = 8
+"""Number of uses of seeds, see ``seed_of``."""
+
+_MOTORS = {"working": 0.0, "held": 1.0, "limp": 2.0}
+_MASS, _INERTIA = 4, 5
+"""Where mass and inertia of the object stand in a robot's load, see ``end_effector_command``."""
+
+
+def check_deployment(transport: CompiledTransport, deployment: Deployment) -> float:
+    """Return the control period of a run [s].
+
+    Raises:
+        ScenarioError: The compiled loop does not know what departs.
+    """
+    where = str(transport.scenario.path)
+    if deployment.period is None:
+        allowed = "a number of Hz: the compiled loop knows sampled teams alone"
+        raise ScenarioError(where, "deployment.control_rate", None, allowed)
+    for name in transport.robot_names:
+        own, key = deployment.of_robot(name), f"deployment.robots.{name}"
+        if own.sample_offset:
+            allowed = "0: all robots of the compiled loop compute at the same instants"
+            raise ScenarioError(where, f"{key}.sample_offset", own.sample_offset, allowed)
+        for field in ("switch_delay", "clock_error"):
+            if getattr(own, field) and transport.plan.tube is not None:
+                allowed = (
+                    "0 for a plan with a budget: the compiled loop has one nominal motion for all robots"
+                )
+                raise ScenarioError(where, f"{key}.{field}", getattr(own, field), allowed)
+    return deployment.period
+
+
+def departures_of(transport: CompiledTransport, deployment: Deployment) -> LoopDepartures:
+    """Return what departs in a run.
+
+    Raises:
+        ScenarioError: The compiled loop does not know what departs.
+    """
+    period, names = check_deployment(transport, deployment), transport.robot_names
+    m, messages, floor = deployment.measurements, deployment.messages, deployment.floor
+    robots = [deployment.of_robot(name) for name in names]
+    joints = np.diff(transport.team.first[2])
+    sizes = [("object_pose", 3), *(("robot_state", 2 * (3 + int(n))) for n in joints)]
+    errors = [
+        np.c_[measurement_deviations(deployment, *port), measurement_waves(deployment, *port, period)]
+        for port in sizes
+    ]
+    hearing = [[own.clock_error for own in robots]]
+    hearing.append([whole_periods(own.switch_delay, period) for own in robots])
+    bodies = [*names, transport.scenario.object]
+    pushes = [
+        [bodies.index(p.body), *p.force, p.torque, p.time, p.time + p.duration] for p in deployment.pushes
+    ]
+    return LoopDepartures(
+        times=np.array([period, transport.scenario.simulator.max_time, deployment.actuators.lag]),
+        periods=np.array([
+            whole_periods(m.delay, period),
+            max(whole_periods(m.late_by, period), 1),
+            whole_periods(messages.delay, period),
+        ]),
+        seeds=np.array([[seed_of(deployment, k, use) for use in range(_USES)] for k in range(len(names))]),
+        probabilities=np.array([m.loss, m.late, messages.loss, messages.repeat]),
+        errors=np.concatenate(errors),
+        biases=np.array([[own.pose_bias.x, own.pose_bias.y, own.pose_bias.theta] for own in robots]),
+        odometry=np.array([1.0 + own.odometry_scale for own in robots]),
+        shifts=np.array([clock_shift(deployment, k) / period for k in range(len(names))]),
+        limits=np.concatenate([effort_limits(deployment, n) for n in joints]),
+        floor=np.array([floor.coulomb_friction, floor.viscous_friction, downhill(floor.slope)]),
+        friction=np.array([deployment.joint_friction.coulomb, deployment.joint_friction.viscous]),
+        pushes=np.array(pushes, dtype=float).reshape(-1, 6),
+        hearing=np.array(hearing, dtype=float),
+        silences=_silences(deployment, names),
+        blocked=blocked_times(deployment, names),
+        slips=wheel_slips(deployment, names),
+    )  # fmt: skip
+
+
+def _silences(deployment: Deployment, names: tuple[str, ...]) -> FloatArray:
+    found = [deployment.of_robot(name).silence for name in names]
+    rows = [
+        (inf, inf, 0.0)
+        if one is None
+        else (one.begin, inf if one.duration is None else one.begin + one.duration, _MOTORS[one.motors])
+        for one in found
+    ]
+    return np.array(rows).T.copy()
+
+
+def believed(team: FusedTeam, mass_error: float) -> FusedTeam:
+    """Return the robots' models as they believe them to be: all masses and inertias wrong by a factor."""
+    factor, chains, loads = 1.0 + mass_error, team.chains.copy(), team.loads.copy()
+    chains[:, [MASS, INERTIA]] *= factor
+    loads[:, [_MASS, _INERTIA]] *= factor
+    return team._replace(chains=chains, loads=loads)
+
+
+def nominal_of(transport: CompiledTransport, period: float) -> LoopNominal:
+    """Return the nominal motions for a control period [s]."""
+    budget, gains = transport.plan.budget, transport.plan.transitions[0].gains
+    nominal = transport.nominal
+    if not nominal.position.size or budget is None:
+        return nominal
+    speed, _, radius, rate = nominal.position
+    periods = report_periods(budget.report_age, period)
+    flow = _flow(gains.stiffness, gains.damping, period).copy()
+    return nominal._replace(flow=flow, position=np.array([speed, periods, radius, rate]))
+
+
+@lru_cache(maxsize=32)
+def _flow(stiffness: float, damping: float, period: float) -> FloatArray:
+    """Return ``nominal_flow``; the threads of BLAS that it wakes would cost as much as half a run."""
+    return nominal_flow(stiffness, damping, period)
+
+
+def memory_of(transport: CompiledTransport, departures: LoopDepartures) -> LoopMemory:
+    """Return the state of a run at its start: at rest, with nothing measured and nothing heard."""
+    robots, M = len(transport.robot_names), len(transport.first_axes)
+    states, efforts = 2 * (2 * robots + M), 2 * robots + M
+    ring, rows = int(departures.periods[0]) + 2, int(departures.periods[1])
+    start, widest = transport.plan.start, int(2 * (3 + np.diff(transport.team.first[2]).max()))
+    channels = channel_rows(int(departures.periods[2]))
+    nothing = np.zeros(M)
+    return LoopMemory(
+        state=transport.start.copy(),
+        current=np.zeros((int(departures.hearing[1].max()) + ring, 2)),
+        poses=np.zeros((ring, robots, 3)),
+        states=np.zeros((ring, states)),
+        exact=np.zeros((2, 3 * robots + states)),
+        lines=np.zeros((robots, 2, rows, 1 + widest)),
+        governors=np.tile(start[:2], (robots, 1)),
+        nominal=np.tile([*start[:2], 0.0, 0.0, *start[:2]], (ring, 1)),
+        axes=np.tile([transport.first_axes, nothing, nothing], (ring, 1, 1)),
+        jumps=first_jumps(transport.cells.tables[0], transport.first_axes),
+        jumped=np.zeros(robots),
+        recent=np.full((2 * mean_samples(float(departures.times[0])), efforts), inf),
+        efforts=np.zeros((2, efforts)),
+        channels=np.full((robots, channels, READY_SIZE), NOTHING),
+        reports=np.full((2, robots, READY_SIZE), NOTHING),
+        alarms=np.tile([0.0, 0.0, 0.0, LONG_AGO], (robots, 1)),
+    )
+
+
+# Runs of the compiled loop: one, or many of one transport.
 
 
 @dataclass(frozen=True)

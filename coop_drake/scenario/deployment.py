@@ -8,7 +8,7 @@ new departure is a field here, a block there, tests in ``tests/diagram/test_depl
 harsh case in ``tests/closed_loop/test_deployment.py``, a row of ``docs/how_to/deployment.md``, wrong values
 for it in ``tests/support/mutants/values.py``, and ``docs/reference/scenario.md``, which ``python -m
 docs.generate`` writes. The compiled loop takes departures from
-``coop_drake/compiled_loop/departing.py``, and refuses those that it does not know.
+``coop_drake/compiled_loop/running.py``, and refuses those that it does not know.
 """
 
 from dataclasses import dataclass, field, replace

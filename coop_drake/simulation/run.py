@@ -6,7 +6,6 @@ import gc
 import logging
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from functools import partial
 
 import numpy as np
 from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorConfig
@@ -76,19 +75,7 @@ def simulate(
         PlanError: The plan belongs to another team, or the number of maps is not the number of cells.
         ScenarioError: The models do not make a team.
     """
-    build = partial(build_closed_loop, scenario, plan, maps, replacements=replacements)
-    return run_and_release(build, scenario, progress=progress, observer=observer)
-
-
-def run_and_release(
-    build: Callable[[], Loop],
-    scenario: Scenario,
-    *,
-    progress: Progress | None = None,
-    observer: Callable[[Sample], None] | None = None,
-) -> SimulationLog:
-    """Build a closed loop, run it as :func:`simulate` does, and free its memory."""
-    loop = build()
+    loop = build_closed_loop(scenario, plan, maps, replacements=replacements)
     try:
         return run_loop(loop, scenario, progress=progress, observer=observer)
     finally:

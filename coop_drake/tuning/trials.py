@@ -16,7 +16,7 @@ from pathlib import Path
 
 from coop_drake.answers import Found, Plan, PlanningProblem
 from coop_drake.compiled_loop import CompiledTransport, prepare, run, with_gains
-from coop_drake.compiled_loop.departing import check_deployment
+from coop_drake.compiled_loop.running import check_deployment
 from coop_drake.errors import ScenarioError
 from coop_drake.harmonic_maps import HarmonicMap
 from coop_drake.interrupts import uninterrupted

@@ -12,9 +12,9 @@ import numpy as np
 
 from coop_drake.answers.plan import Plan
 from coop_drake.compiled_loop import CompiledTransport, prepare
-from coop_drake.compiled_loop.departing import departures_of, memory_of
 from coop_drake.compiled_loop.looping import update
 from coop_drake.compiled_loop.robots import robot_room
+from coop_drake.compiled_loop.running import departures_of, memory_of
 from coop_drake.compiled_loop.watching import begin_figures, watch, watch_room
 from coop_drake.diagram import build_closed_loop
 from coop_drake.geometry.boundary import edges_of

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import partial
 
 import numpy as np
 from pydrake.systems.framework import BasicVector, Context, DiagramBuilder, DiscreteValues
@@ -16,9 +15,9 @@ from pydrake.systems.primitives import Demultiplexer
 from coop_drake.answers.log import SimulationLog
 from coop_drake.compiled_loop import CompiledTransport
 from coop_drake.compiled_loop.arrays import LoopCells, LoopDepartures, LoopMemory, LoopNominal
-from coop_drake.compiled_loop.departing import believed, departures_of, memory_of, nominal_of
 from coop_drake.compiled_loop.looping import compute, update
 from coop_drake.compiled_loop.robots import ACCELERATION, COMMAND, ENERGY, heard_cell, robot_room
+from coop_drake.compiled_loop.running import believed, departures_of, memory_of, nominal_of
 from coop_drake.compiled_loop.sensing import measure
 from coop_drake.compiled_loop.watching import left_by_all
 from coop_drake.diagram.station import (
@@ -38,7 +37,7 @@ from coop_drake.plant import build_team_plant
 from coop_drake.plant.configuration import displacement
 from coop_drake.progress import Progress
 from coop_drake.scenario import Deployment, Scenario
-from coop_drake.simulation.run import run_and_release
+from coop_drake.simulation import run_loop
 from coop_drake.simulation.telemetry import Sample
 from coop_drake.systems import Block
 from coop_drake.systems.departure_monitor import ALARM_SIZE
@@ -288,8 +287,11 @@ def simulate_sampled(
     """
     deployment = transport.scenario.deployment if deployment is None else deployment
     scenario = replace(transport.scenario, deployment=deployment)
-    build = partial(build_sampled_loop, transport, deployment)
-    return run_and_release(build, scenario, progress=progress, observer=observer)
+    loop = build_sampled_loop(transport, deployment)
+    try:
+        return run_loop(loop, scenario, progress=progress, observer=observer)
+    finally:
+        loop.release()
 
 
 def _driven_station(scenario: Scenario) -> TransportStation:

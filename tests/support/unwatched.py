@@ -6,11 +6,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from coop_drake.compiled_loop.departing import believed, departures_of, memory_of, nominal_of
 from coop_drake.compiled_loop.looping import update
 from coop_drake.compiled_loop.motion import advance, motion_room
 from coop_drake.compiled_loop.preparing import CompiledTransport
 from coop_drake.compiled_loop.robots import robot_room
+from coop_drake.compiled_loop.running import believed, departures_of, memory_of, nominal_of
 from coop_drake.compiled_loop.watching import left_by_all
 from coop_drake.plant.configuration import displacement
 from coop_drake.scenario import Deployment

@@ -70,7 +70,7 @@ class RunMaker:
         try:
             scenario = self._variation.scenario_of(run)
             if self._tier == "compiled":
-                from coop_drake.compiled_loop.departing import departures_of
+                from coop_drake.compiled_loop.running import departures_of
 
                 departures_of(self._prepared(scenario, plan, maps), scenario.deployment)
             else:
