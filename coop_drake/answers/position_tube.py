@@ -23,7 +23,8 @@ class PositionTube:
         rate: Largest departure of its velocity from the nominal one [m/s].
         velocity: Largest speed of the object's origin [m/s].
         rest: Largest distance from the nominal position after both have come to rest [m].
-        acceleration: Largest acceleration that a robot commands for the object's origin [m/s^2].
+        acceleration: Largest acceleration that a robot commands for the object's origin, times the factor by
+            which its masses may be too large: its forces over the true mass [m/s^2].
     """
 
     tracking_stiffness: _Exact

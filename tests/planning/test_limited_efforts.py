@@ -7,7 +7,9 @@ import numpy as np
 import pytest
 
 from coop_drake.answers import Found
+from coop_drake.answers.budget import LIMITS
 from coop_drake.cli.task import read_task
+from coop_drake.compiled_loop import prepare, run
 from coop_drake.errors import RefusalError, ScenarioError
 from coop_drake.planning.planner import plan
 from coop_drake.plant.budgets import budget_of
@@ -59,6 +61,30 @@ def test_a_run_asks_for_no_more_than_its_plan_states(limited):
     assert (np.abs(log.base_wrenches[..., 2]) <= stated[:, 2:4]).all()
     assert (np.abs(log.joint_torques) <= stated[:, 4:]).all()
     assert forces.max() > 0.1 * stated[:, :2].max()
+
+
+@pytest.mark.slow
+def test_whatever_departs_within_the_budget_no_robot_asks_for_more_than_is_stated(limited):
+    """Limits just as large as what is stated change nothing of any run, not even its last bit."""
+    asked, made = limited
+    transport = prepare(asked.scenario, made, build_maps(made))
+    stated = np.array([one.tolerance.effort for one in made.transitions]).max(axis=0)
+    parts = stated[:2].max(), stated[2:4].max(), stated[4:].max()
+    own = asked.scenario.deployment
+
+    def outcome(seed, limits):
+        random = np.random.default_rng(seed)
+        error = float(random.uniform(-own.mass_error, own.mass_error))
+        actuators = replace(own.actuators, **dict(zip(LIMITS, limits, strict=True)))
+        return run(transport, replace(own, seed=seed, mass_error=error, actuators=actuators))
+
+    most = 0.0
+    for seed in range(40):
+        free = outcome(seed, (None,) * 3)
+        assert free.arrived, free.reason
+        assert outcome(seed, parts) == free
+        most = max(most, free.peak_force)
+    assert outcome(0, (0.3 * most, None, None)) != outcome(0, (None,) * 3)
 
 
 @pytest.mark.slow

@@ -23,8 +23,8 @@ by s times its largest |x''|, which the plan states (``AxisTracking``).
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from math import inf
 
 import numpy as np
@@ -65,6 +65,10 @@ RATE_WEIGHT = 0.01
 """What a departure of the rate counts beside one of the axis, where gains are chosen [s]: it takes its part
 of the limit of the rate."""
 
+COMMAND_WEIGHTS = (0.0005, 0.004)
+"""What noise in a command counts beside a departure of the axis, where efforts are limited [s^2]: for stiff
+loops, as an axis with little room needs them, and for soft ones, which take small efforts."""
+
 SLACK = 1e-3
 """Fraction by which stated bounds are wider than computed ones [-]: more than the responses after
 ``HORIZON`` and another way to round need."""
@@ -86,12 +90,15 @@ class AxisLoop:
         sums: Of every part of the model's range the sums of responses, shape (parts, 3, 3).
         kicks: Responses to a unit of acceleration in one period within ``MEMORY``, the oldest first, shape
             (parts, 3, memory).
+        answers: Pull that answers a unit of command in one of the periods before, likewise, with its sign,
+            shape (parts, memory).
     """
 
     tracking: AxisTracking
     budget: Budget
     sums: FloatArray
     kicks: FloatArray
+    answers: FloatArray
 
     @property
     def rest(self) -> float:
@@ -130,22 +137,24 @@ class AxisLoop:
         return away, fast
 
 
-def best_loop(budget: Budget, disturbance: Sequence[float] = ()) -> AxisLoop | None:
+@lru_cache(maxsize=8)
+def best_loop(budget: Budget, disturbance: tuple[float, ...] = (), weight: float = 0.0) -> AxisLoop | None:
     """Return the loop with the gains for which a typical axis departs least; None where none is stable.
 
     Args:
         budget: The budget.
         disturbance: As that of ``AxisTracking``.
+        weight: What noise in a command counts beside a departure, see ``COMMAND_WEIGHTS`` [s^2].
     """
     best, least = None, inf
     for stiffness in STIFFNESSES:
         for damping in DAMPINGS:
-            tracking = AxisTracking(stiffness, damping * stiffness**0.5, disturbance=tuple(disturbance))
+            tracking = AxisTracking(stiffness, damping * stiffness**0.5, disturbance=disturbance)
             loop = axis_loop(tracking, budget)
             if loop is None:
                 continue
             away, fast = loop.typical()
-            found = away + RATE_WEIGHT * fast
+            found = away + RATE_WEIGHT * fast + weight * float(loop.noises(1)[:, :, Q].max())
             if found < least:
                 best, least = loop, found
     return best
@@ -157,10 +166,11 @@ def axis_loop(tracking: AxisTracking, budget: Budget) -> AxisLoop | None:
     periods = whole_periods(budget.delay, T), whole_periods(HORIZON, T)
     gains, factors = (tracking.stiffness, tracking.damping), _factors(budget)
     kicks = np.zeros((len(factors), 3, whole_periods(MEMORY, T)))
-    pairs = zip(factors, kicks, strict=True)
-    sums = np.array([_sums(gains, T, budget.lag, factor, periods, own) for factor, own in pairs])
+    answers = np.zeros(kicks[:, 0].shape)
+    runs = zip(factors, kicks, answers, strict=True)
+    sums = np.array([_sums(gains, T, budget.lag, factor, periods, own, pull) for factor, own, pull in runs])
     good = np.isfinite(sums).all() and (_rest(budget) * sums[:, Q, ACCELERATION] < 1.0).all()
-    return AxisLoop(tracking, budget, sums, kicks) if good else None
+    return AxisLoop(tracking, budget, sums, kicks, answers) if good else None
 
 
 def _factors(budget: Budget) -> list[float]:
@@ -182,6 +192,7 @@ def _sums(
     factor: float,
     periods: tuple[int, int],
     kicks: FloatArray,
+    answers: FloatArray,
 ) -> FloatArray:
     """Return the sums of the magnitudes of responses, shape (3, 3), infinite where one does not end.
 
@@ -196,6 +207,7 @@ def _sums(
         periods: Delay and ``HORIZON`` in periods.
         kicks: Receives the responses to a unit of acceleration within ``MEMORY``, the oldest first, shape (3,
             memory).
+        answers: Receives the pull that answers a unit of command, likewise, shape (memory,).
     """
     T, (delay, n), memory = period, periods, kicks.shape[1]
     left, in_v, in_x = lag_factors(T, lag)
@@ -221,6 +233,8 @@ def _sums(
                 sums[i, 2] += kick
             else:
                 kicks[i, memory - 1 - k] = kick
+        if 0 < k <= memory:
+            answers[memory - k] = pull[0, k]
         quiet = quiet + 1 if largest < LEFT else 0
         if quiet > delay + 1:  # nothing that is measured later differs from this
             return sums

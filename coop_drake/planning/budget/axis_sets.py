@@ -20,6 +20,8 @@ from coop_drake.laws.funnels import CLOSING
 from coop_drake.planning.budget.axis_tube import (
     ACCELERATION,
     COLUMNS,
+    COMMAND,
+    COMMAND_REACH,
     DISTANCE,
     V_REACH,
     X_REACH,
@@ -101,6 +103,17 @@ class AxisSets:
             moving[:, : len(tube)] = np.maximum(moving[:, : len(tube)], now)
         moving[1] += period * moving[0]
         return moving
+
+    def commands(self, samples: int) -> FloatArray:
+        """Return the least and the largest command of every period, the last for ever, (2, samples + 1)."""
+        bounds = np.repeat([[np.inf], [-np.inf]], samples + 1, axis=1)
+        for tube in self.tubes:
+            n, middle, reach = len(tube), tube[:, COMMAND], tube[:, COMMAND_REACH]
+            bounds[0, :n] = np.minimum(bounds[0, :n], middle - reach)
+            bounds[1, :n] = np.maximum(bounds[1, :n], middle + reach)
+            bounds[0, n:] = np.minimum(bounds[0, n:], -self.last)
+            bounds[1, n:] = np.maximum(bounds[1, n:], self.last)
+        return bounds
 
     def fastest(self, departures: FloatArray, period: float) -> float:
         """Return the largest rate of an axis whose rate departs by these, as for ``spare`` [rad/s or m/s]."""

@@ -21,11 +21,11 @@ from coop_drake.laws.nominal_axes import lag_factors
 from coop_drake.planning.budget.law_fit import fit_law, law_memory
 from coop_drake.tree.pose import FloatArray
 
-X, X_REACH, V, V_REACH, ACCELERATION, DISTANCE = range(6)
-COLUMNS = 6
+X, X_REACH, V, V_REACH, ACCELERATION, DISTANCE, COMMAND, COMMAND_REACH = range(8)
+COLUMNS = 8
 """Columns of a tube, a row for every sample: x and the most that it may depart [rad or m], v and the most
-that it may depart [rad/s or m/s], the largest |acceleration| until the next sample, and the least distance to
-the funnel's bounds until then."""
+that it may depart [rad/s or m/s], the largest |acceleration| until the next sample, the least distance to the
+funnel's bounds until then, and the command and the most that it may depart [rad/s^2 or m/s^2]."""
 
 DIVERGED = 1e3
 """A departure beyond this ends the pass [rad or m]."""
@@ -79,6 +79,7 @@ def follow_tube(
         if k < LATE:  # all of the command, the old one or the new one, counts as a disturbance
             most = max(most, entry[4])
             u, slope, by_rate, weight[3 + k] = 0.0, 0.0, 0.0, most
+        tube[k, COMMAND], tube[k, COMMAND_REACH] = u, most - abs(u)
         _note(tube[k], row, k * T, T, state, max(abs(p) + p_reach, most))
         if not tube[k, DISTANCE] > 0.0 or not x_reach < DIVERGED:
             return False
@@ -118,7 +119,7 @@ def _note(
     state: tuple[float, float, float, float],
     fastest: float,
 ) -> None:
-    """Write one row of a tube.
+    """Write one row of a tube but its command.
 
     Between two samples a motion departs from its chord by at most T^2 / 8 times its acceleration, and so does
     a bound of the funnel.

@@ -36,16 +36,30 @@ from coop_drake.planning.budget.team_waves import (
 from coop_drake.tree import ComponentTree, TreeJoint
 from coop_drake.tree.pose import FloatArray, IntArray
 
-TOLERANCE = 1.08
-"""Boxes are halved until a bound is at most this many times what is found in its cell [-]."""
 
-FLOOR = 0.02
-"""Or at most this share of the largest number of its kind for the same axis more [-]: coefficients near zero
-matter little."""
+class Precision(NamedTuple):
+    """How near bounds are to what they bound.
 
-SLACK, SLACK_FLOOR = 1.04, 0.02
-"""Factor by which coefficients are larger than their bounds, and what they have more of the largest number of
-their kind [-]: the verifier halves its boxes until its bounds are above what is true by no more."""
+    Attributes:
+        tolerance: Boxes are halved until a bound is at most this many times what is found in its cell [-].
+        floor: Or at most this share of the largest number of its kind for the same axis more [-]:
+            coefficients near zero matter little.
+        slack: Factor by which coefficients are larger than their bounds [-]: the verifier halves its boxes
+            until its bounds are above what is true by no more.
+        slack_floor: What they have more of the largest number of their kind [-].
+    """
+
+    tolerance: float
+    floor: float
+    slack: float
+    slack_floor: float
+
+
+OF_ACCELERATIONS = Precision(1.08, 0.02, 1.04, 0.02)
+"""Precision of accelerations, whose inverse mass matrix takes many boxes."""
+
+OF_EFFORTS = Precision(1.015, 0.005, 1.01, 0.004)
+"""Precision of efforts, which are sums of waves: a tenth of a second for four joints."""
 
 MOST_BOXES = 40_000
 """Boxes that are looked at, for all cells together [-]; what is left then has wider bounds."""
@@ -88,7 +102,7 @@ def cell_couplings(budget: Budget, tree: ComponentTree, cells: Sequence[Cell]) -
     system, pairs = _system(budget, tree), _pairs(axes)
     kinds = np.repeat([0, 1, 2], [len(pairs), 2 * robots, n])
     lower, upper = (np.array([getattr(cell, side)[1:] for cell in cells]) for side in ("lower", "upper"))
-    most = refined(lambda c, r: _accelerations(system, c, r), lower, upper, kinds)
+    most = refined(lambda c, r: _accelerations(system, c, r), lower, upper, kinds, OF_ACCELERATIONS)
     rates = np.zeros((len(cells), 1 + axes, axes, axes))
     for p, (j, k) in enumerate(pairs):
         rates[:, :, j, k] = most[:, :, p]
@@ -233,7 +247,9 @@ _Bounding = Callable[[FloatArray, FloatArray], tuple[FloatArray, FloatArray, Flo
 matters."""
 
 
-def refined(bounding: _Bounding, lower: FloatArray, upper: FloatArray, kinds: IntArray) -> FloatArray:
+def refined(
+    bounding: _Bounding, lower: FloatArray, upper: FloatArray, kinds: IntArray, precision: Precision
+) -> FloatArray:
     """Return bounds over cells, from boxes that are halved until the bounds are tight.
 
     Args:
@@ -241,6 +257,7 @@ def refined(bounding: _Bounding, lower: FloatArray, upper: FloatArray, kinds: In
         lower: Lower ends of the joints' intervals, shape (cells, n).
         upper: Upper ends, shape (cells, n).
         kinds: Which columns are of the same kind, numbered from 0, shape (columns,).
+        precision: How tight they shall be.
 
     Returns:
         Shape (cells, rows, columns).
@@ -251,7 +268,7 @@ def refined(bounding: _Bounding, lower: FloatArray, upper: FloatArray, kinds: In
     while owners.size:
         sizes, bounds, matters = bounding(middles, reaches)
         np.maximum.at(found, owners, sizes)
-        allowed = TOLERANCE * found + FLOOR * _largest(found, kinds)
+        allowed = precision.tolerance * found + precision.floor * _largest(found, kinds)
         looked += owners.size
         good = np.all(bounds <= allowed[owners], axis=(1, 2))
         if looked + 2 * (~good).sum() > MOST_BOXES:
@@ -266,7 +283,7 @@ def refined(bounding: _Bounding, lower: FloatArray, upper: FloatArray, kinds: In
         away[rows, axis] = reaches[rows, axis]
         owners, middles = np.concatenate([owners, owners]), np.concatenate([middles - away, middles + away])
         reaches = np.concatenate([reaches, reaches])
-    return SLACK * most + SLACK_FLOOR * _largest(most, kinds)
+    return precision.slack * most + precision.slack_floor * _largest(most, kinds)
 
 
 def _largest(numbers: FloatArray, kinds: IntArray) -> FloatArray:
@@ -333,7 +350,8 @@ def cell_efforts(budget: Budget, tree: ComponentTree, cells: Sequence[Cell]) -> 
     waves, numbers = collect.waves(n), np.array(functions, dtype=np.intp)
     kinds = np.repeat([0, 1, 2], [1, axes, len(pairs)])
     lower, upper = (np.array([getattr(cell, side)[1:] for cell in cells]) for side in ("lower", "upper"))
-    most = refined(lambda c, r: _sizes(waves, numbers, c, r), lower - room, upper + room, kinds)
+    sizes = lambda c, r: _sizes(waves, numbers, c, r)  # noqa: E731
+    most = refined(sizes, lower - room, upper + room, kinds, OF_EFFORTS)
     rates = np.zeros((*most.shape[:2], axes, axes))
     for p, (j, k) in enumerate(pairs):
         rates[:, :, j, k] = most[:, :, 1 + axes + p]

@@ -55,12 +55,14 @@ class Departures(NamedTuple):
         rate: Largest |e'| [rad/s or m/s].
         acceleration: Largest |e''| [rad/s^2 or m/s^2].
         pull: Largest part of a command that pulls an axis to its nominal motion [rad/s^2 or m/s^2].
+        entered: d for every part of the model's range, shape (periods + 1, axes, parts).
     """
 
     position: FloatArray
     rate: FloatArray
     acceleration: FloatArray
     pull: FloatArray
+    entered: FloatArray
 
 
 class _Scales(NamedTuple):
@@ -114,7 +116,10 @@ def departing(
     highest = np.maximum.accumulate(entered[..., ::-1], axis=3)[..., ::-1]
     first = min(leaving, samples + 1)
     past = highest[..., first : first + memory].copy()
-    return Departures(*found), Inflow(past, np.stack([state[0], state[2]]))
+    of_periods = entered[0, ..., memory:].transpose(2, 1, 0)
+    return Departures(found[0], found[1], found[2], found[3], of_periods), Inflow(
+        past, np.stack([state[0], state[2]])
+    )
 
 
 def moving_evenly(loop: AxisLoop, coupling: FloatArray, moving: tuple[float, float]) -> Departures:

@@ -15,8 +15,14 @@ from coop_drake.laws import ScheduledGains
 from coop_drake.laws.axis_table import LEAVING_TIME, REST_RATE, REST_REACH, axis_table
 from coop_drake.laws.gains import IDEAL_AGE, RestCondition
 from coop_drake.planning.budget.alarms import axis_noises
-from coop_drake.planning.budget.axis_departure import SLACK, AxisLoop, best_loop
-from coop_drake.planning.budget.coupling import Couplings, TeamCouplings, friction_pushes, team_couplings
+from coop_drake.planning.budget.axis_departure import SLACK, AxisLoop, axis_loop, best_loop
+from coop_drake.planning.budget.coupling import (
+    Couplings,
+    Efforts,
+    TeamCouplings,
+    friction_pushes,
+    team_couplings,
+)
 from coop_drake.planning.budget.restarting import reached_at_restart, with_restart
 from coop_drake.planning.budget.transitions import (
     LimitedEfforts,
@@ -37,6 +43,9 @@ ROUNDS = 8
 ROOM = 1.05
 """Factor by which the next ones are larger than those that were reached [-]."""
 
+NOTHING = 1e-12
+"""Masses and levers below this are none [kg, kg m]."""
+
 _UNSTABLE = UnprovedTransition(0, 0, "is not stable under the delay, the lag and the model's error")
 
 
@@ -47,6 +56,7 @@ def fit_budget(
     budget: Budget,
     acceleration: float = 0.0,
     team: TeamCouplings | None = None,
+    weight: float = 0.0,
 ) -> Plan | UnprovedTransition:
     """Choose gains for every transition so that a budget holds, the quickest that do.
 
@@ -60,16 +70,18 @@ def fit_budget(
         acceleration: Largest acceleration that a robot commands for the object's origin, which counts where
             efforts are limited [m/s^2].
         team: What the masses couple in the plan's cells, computed where it is not given.
+        weight: What noise in commands counts where the loop is chosen, see ``best_loop`` [s^2].
 
     Returns:
         The plan with these gains, the budget and what follows from it, with the times estimated before; or
-        where it does not hold.
+        where it does not hold. Where efforts are limited it states nothing about rests yet, which depends on
+        the position's tube.
     """
     couplings, efforts = team or team_couplings(budget, problem.tree, plan.cells)
     pushes = friction_pushes(budget, couplings, 0.0) if budget.rubs else np.zeros(0)
     if not np.isfinite(pushes).all():
         return UnprovedTransition(0, None, "cells are too wide to bound what friction of joints accelerates")
-    loop = best_loop(budget, pushes.tolist())
+    loop = best_loop(budget, tuple(pushes.tolist()), weight)
     if loop is None:
         return _UNSTABLE
     factors = _factors(gain_set, budget)
@@ -100,7 +112,44 @@ def fit_budget(
         for k, passed in enumerate(found)
     )
     fitted_plan = replace(plans[0], transitions=fitted, budget=budget, axis_tracking=loop.tracking)
-    return with_restart(fitted_plan, loop, couplings.rates[:, 1:], limited)
+    return fitted_plan if limited else with_restart(fitted_plan, loop, couplings.rates[:, 1:], None)
+
+
+def acceleration_left(plan: Plan, efforts: Efforts, acceleration: float) -> float:
+    """Return the largest acceleration of the object's origin for which limits of efforts leave room [m/s^2].
+
+    Args:
+        plan: A plan of ``fit_budget``.
+        efforts: What efforts accelerations take in its cells.
+        acceleration: The acceleration for which it states efforts [m/s^2].
+    """
+    stated = np.array([one.tolerance.effort for one in plan.transitions if one.tolerance is not None])
+    left = (efforts.limits - stated) / np.maximum((1.0 + SLACK) * efforts.push, NOTHING)
+    return acceleration + float(left.min())
+
+
+def with_acceleration(plan: Plan, team: TeamCouplings, before: float) -> Plan:
+    """Return a plan that states efforts for the acceleration of its tube, and from which rests it holds.
+
+    Args:
+        plan: A plan of ``fit_budget`` with a tube.
+        team: What its masses couple in its cells.
+        before: The acceleration for which it states efforts [m/s^2].
+    """
+    (couplings, efforts), tube, tracking, budget = team, plan.tube, plan.axis_tracking, plan.budget
+    assert efforts is not None  # the budget limits some
+    assert tube is not None
+    assert tracking is not None
+    assert budget is not None
+    transitions = []
+    for one, push in zip(plan.transitions, efforts.push, strict=True):
+        assert one.tolerance is not None  # of a plan with a budget
+        effort = one.tolerance.effort + (1.0 + SLACK) * (tube.acceleration - before) * push
+        transitions.append(replace(one, tolerance=replace(one.tolerance, effort=effort)))
+    loop, limited = axis_loop(tracking, budget), LimitedEfforts(efforts, tube.acceleration)
+    assert loop is not None  # the plan's axes were fitted with it
+    stated = replace(plan, transitions=tuple(transitions))
+    return with_restart(stated, loop, couplings.rates[:, 1:], limited)
 
 
 def _faster(found: Sequence[ProvedTransition], loop: AxisLoop, couplings: Couplings) -> AxisTracking | None:

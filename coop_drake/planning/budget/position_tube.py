@@ -34,7 +34,7 @@ from coop_drake.jit import compiled
 from coop_drake.laws.sampling import whole_periods
 from coop_drake.tree.pose import FloatArray
 
-MODEL_PARTS = 5
+MODEL_PARTS = 10
 """Parts into which the range of the model's error is cut [-]; within each only the rest is a disturbance."""
 
 HORIZON = 6.0
@@ -88,12 +88,10 @@ def position_tubes(gains: Sequence[PositionGains], budget: Budget) -> list[Posit
         budget: The departures to be tolerated.
     """
     worst: list[FloatArray | None] = [np.zeros(5) for _ in gains]
-    errors = position_errors(budget)
-    rest = budget.model_error / len(errors)
-    for error in errors:
+    for error in position_errors(budget):
         sums = {loop: _sums_of(loop, budget, error) for loop in dict.fromkeys(own.loop for own in gains)}
         for i, own in enumerate(gains):
-            before, found = worst[i], _bounds(own, budget, sums[own.loop], rest)
+            before, found = worst[i], _bounds(own, budget, sums[own.loop], error)
             worst[i] = None if before is None or found is None else np.maximum(before, found)
     return [
         None if bounds is None else _stated(own, bounds) for own, bounds in zip(gains, worst, strict=True)
@@ -111,12 +109,14 @@ def _stated(gains: PositionGains, bounds: FloatArray) -> PositionTube:
     return PositionTube(*loop, *(float((1.0 + SLACK) * value) for value in bounds))
 
 
-def _bounds(gains: PositionGains, budget: Budget, sums: FloatArray | None, rest: float) -> FloatArray | None:
-    """Return radius, rate, velocity, rest and command, shape (5,), from the sums of responses (5, 3).
+def _bounds(gains: PositionGains, budget: Budget, sums: FloatArray | None, error: float) -> FloatArray | None:
+    """Return radius, rate, velocity, rest and acceleration, (5,), from the sums of responses (6, 3).
 
     Part of the error of the model is a disturbance of at most ``rest`` times the command itself, which the
-    command's bound must allow for.
+    command's bound must allow for. A step of p_G moves the nominal acceleration and then the feedback, whose
+    sum is the command: their responses are added with their signs before their sizes are summed.
     """
+    rest = budget.model_error / len(position_errors(budget))
     if sums is None or rest * sums[2, 1] >= 1.0:
         return None
     noise = gains.tracking_stiffness * budget.position_noise + gains.tracking_damping * budget.velocity_noise
@@ -126,7 +126,7 @@ def _bounds(gains: PositionGains, budget: Budget, sums: FloatArray | None, rest:
         return None
     radius, rate, velocity, command, acceleration = moving
     between = budget.period**2 / 8.0 * (acceleration + gains.speed * sums[3, 2])
-    own = command + (budget.single_noise - 1.0) * noise
+    own = (1.0 + error + rest) * (command + (budget.single_noise - 1.0) * noise)
     return np.array([radius + between, rate, velocity, still[0] + between, own])
 
 
@@ -147,7 +147,8 @@ def _with_clocks(
 
     def caused(noise: float) -> FloatArray:
         moving = noise * sums[:, 0] + budget.acceleration_error * sums[:, 1] + speed * sums[:, 2]
-        command = (moving[2] + noise + nominal) / (1.0 - rest * sums[2, 1])
+        led = noise * (1.0 + sums[2, 0]) + budget.acceleration_error * sums[2, 1] + speed * sums[5, 2]
+        command = led / (1.0 - rest * sums[2, 1])
         away, rate = moving[:2] + rest * command * sums[:2, 1]
         acceleration = (1.0 + budget.model_error) * command + budget.acceleration_error
         rate += T / 2.0 * (acceleration + nominal)
@@ -179,11 +180,12 @@ def response_sums(
     nominal: FloatArray,
     samples: int,
 ) -> tuple[FloatArray, float]:
-    """Return the sums of |h|, shape (5, 3), and the largest response that is left.
+    """Return the sums of |h|, shape (6, 3), and the largest response that is left.
 
-    Rows: e, e', feedback, nominal acceleration, p^'. Columns: for a unit of command in each period, for
-    a unit of acceleration w, of speed of p_G. A disturbance w within a period acts on the sample after it
-    by (T - t) on e and by 1 on e'; |h_e (T - t) + h_v| is convex in t, so that its chord is above it.
+    Rows: e, e', feedback, nominal acceleration, p^', sum of feedback and nominal acceleration. Columns: for a
+    unit of command in each period, for a unit of acceleration w, of speed of p_G. A disturbance w within a
+    period acts on the sample after it by (T - t) on e and by 1 on e'; |h_e (T - t) + h_v| is convex in t, so
+    that its chord is above it.
 
     Args:
         T: Control period [s].
@@ -196,7 +198,7 @@ def response_sums(
     size = len(held)
     state, after = np.zeros((size, 4)), np.zeros((size, 4))
     state[:, 0], state[V, 1], state[E, 2], state[Q, 3] = held, 1.0, 1.0, -1.0
-    sums, h, left = np.zeros((5, 3)), np.zeros((5, 4)), np.inf
+    sums, h, left = np.zeros((6, 3)), np.zeros((6, 4)), np.inf
     for _ in range(samples):
         h[0], h[1], h[4] = state[E], state[V], state[R]
         h[2:4] = 0.0
@@ -204,7 +206,8 @@ def response_sums(
             for c in range(4):
                 h[2, c] += feedback[i] * state[i, c]
                 h[3, c] += nominal[i] * state[i, c]
-        for i in range(5):
+        h[5] = h[2] + h[3]
+        for i in range(6):
             sums[i, 0] += abs(h[i, 0])
             sums[i, 1] += 0.5 * T * (abs(h[i, 2] * T + h[i, 1]) + abs(h[i, 1]))
             sums[i, 2] += T * abs(h[i, 3])

@@ -26,6 +26,7 @@ from coop_drake.laws.readiness import RATE_TOLERANCE
 from coop_drake.laws.sampling import whole_periods
 from coop_drake.planning.budget.axis_departure import ACCELERATION as PUSHED
 from coop_drake.planning.budget.axis_departure import HORIZON, SLACK, AxisLoop
+from coop_drake.planning.budget.commands import single_noise
 from coop_drake.planning.budget.departing import moving_evenly
 from coop_drake.planning.budget.position_tube import HORIZON as POSITION_HORIZON
 from coop_drake.planning.budget.position_tube import E, V, position_errors, position_loop
@@ -63,7 +64,7 @@ def with_restart(plan: Plan, loop: AxisLoop, couplings: FloatArray, limited: Lim
             for one, limits in zip(found, every, strict=True)
             for fastest, most in ((limits.rate_limit, limits.acceleration_limit), counted)
         ]
-        pulls = np.array([one.pull + resting[2] for one in found])
+        pulls = np.array([one.pull + resting[2] + single_noise(loop, len(one.pull)) for one in found])
         within += [] if limited is None else _efforts_kept(limited, loop.budget, (rate, acceleration), pulls)
         if all(within):
             departures = tuple((1.0 + OTHERWISE) * (one.position + resting[0]) for one in found)
@@ -95,8 +96,8 @@ def _efforts_kept(
     rates = np.full(pulls.shape[1], moving[0] + max(budget.ahead - budget.period, 0.0) * moving[1])
     for k, pull in enumerate(pulls):
         turning = of.axes[k] @ (moving[1] + pull) + np.einsum("j,ejk,k->e", rates, of.rates[k], rates)
-        moved = limited.acceleration * of.push[k] + turning
-        efforts = (1.0 + SLACK) * ((1.0 + budget.model_error) * moved + of.damping @ rates)
+        moved = limited.acceleration * of.push[k] + of.damping @ rates
+        efforts = (1.0 + SLACK) * ((1.0 + budget.model_error) * turning + moved)
         kept.append(bool((efforts <= of.limits).all()))
     return kept
 

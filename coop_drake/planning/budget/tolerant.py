@@ -15,8 +15,9 @@ from coop_drake.answers.problem import PlanningProblem
 from coop_drake.errors import GeometryError, PlanError, StallError
 from coop_drake.laws import ScheduledGains
 from coop_drake.planning.budget.alarms import rubbed
+from coop_drake.planning.budget.axis_departure import COMMAND_WEIGHTS
 from coop_drake.planning.budget.coupling import QUICKEST, TeamCouplings, friction_pushes, team_couplings
-from coop_drake.planning.budget.fitting import fit_budget
+from coop_drake.planning.budget.fitting import acceleration_left, fit_budget, with_acceleration
 from coop_drake.planning.budget.position_fit import (
     UnprovedPosition,
     commanded_accelerations,
@@ -208,24 +209,33 @@ def _within_limits(
 ) -> Plan | UnprovedTransition | UnprovedPosition:
     """Return the quickest plan whose efforts stay within their limits; or what does not hold.
 
-    What the position may take of an effort is lowered, for which it gets slower, until there is enough left
-    for the axes, and as long as the plan gets quicker by it.
+    The axes take what they need beside the least that the position takes of an effort, and the position
+    takes what they leave. Then more is kept for the position, as long as the plan gets quicker by it.
     """
-    best: Plan | None = None
+    efforts = team.efforts
+    assert efforts is not None  # the budget limits some
+    best: tuple[Plan, float] | None = None
     failed: UnprovedTransition | UnprovedPosition | None = None
-    for acceleration in commanded_accelerations(problem, plan, gain_set, _rubbed(budget, team, QUICKEST)):
-        found: Plan | UnprovedTransition | UnprovedPosition
-        found = fit_budget(problem, plan, gain_set, budget, acceleration, team)
-        if isinstance(found, Plan):
-            found = fit_position(problem, found, gain_set, budget, acceleration)
-        if not isinstance(found, Plan):
-            failed = found
-        elif best is not None and plan_time(found) >= plan_time(best):
-            break
-        else:
-            best = found
+    accelerations = commanded_accelerations(problem, plan, gain_set, _rubbed(budget, team, QUICKEST))
+    for weight in COMMAND_WEIGHTS:
+        left = 0.0
+        for kept in reversed(accelerations):
+            if kept <= left:
+                continue
+            found = fit_budget(problem, plan, gain_set, budget, kept, team, weight)
+            if isinstance(found, UnprovedTransition):
+                failed = failed or found
+                break
+            left = acceleration_left(found, efforts, kept)
+            placed = fit_position(problem, found, gain_set, budget, left)
+            if isinstance(placed, UnprovedPosition):
+                failed = failed or placed
+            elif best is None or plan_time(placed) < plan_time(best[0]):
+                best = placed, kept
+            else:
+                break
     if best is not None:
-        return best
+        return with_acceleration(best[0], team, best[1])
     assert failed is not None  # some acceleration is allowed, see unproved_position
     return failed
 

@@ -8,7 +8,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from coop_drake.answers.budget import Budget
 from coop_drake.laws.axis_table import (
     ACCELERATION_LIMIT,
     GOAL_LOWER,
@@ -23,6 +22,7 @@ from coop_drake.planning.budget.alarms import least_distance
 from coop_drake.planning.budget.axis_departure import SLACK, AxisLoop
 from coop_drake.planning.budget.axis_sets import AxisSets, Entry, axis_sets
 from coop_drake.planning.budget.axis_tube import AxisConditions
+from coop_drake.planning.budget.commands import CommandInflow, largest_commands, nothing_commanded
 from coop_drake.planning.budget.coupling import QUICKEST, Efforts
 from coop_drake.planning.budget.departing import Departures, Inflow, at_rest, departing
 from coop_drake.planning.budget.leaving import first_leaving, next_entry
@@ -55,7 +55,8 @@ class LimitedEfforts(NamedTuple):
 
     Attributes:
         efforts: What efforts accelerations take in every cell.
-        acceleration: Largest acceleration that a robot commands for the object's origin [m/s^2].
+        acceleration: Largest acceleration that a robot commands for the object's origin, by the true masses,
+            see ``PositionTube`` [m/s^2].
     """
 
     efforts: Efforts
@@ -91,6 +92,7 @@ class ProvedTransition:
         reached: Largest rates and accelerations of the axes, departures included, shape (2, axes).
         effort: Largest efforts, as a ``Tolerance`` states them.
         inflow: What has entered the loops of its axes when the next one begins.
+        commanded: What has been commanded then; None where nothing limits efforts.
         choice: Number of the gains that it has.
     """
 
@@ -103,6 +105,7 @@ class ProvedTransition:
     reached: FloatArray
     effort: FloatArray
     inflow: Inflow
+    commanded: CommandInflow | None = None
     choice: int = 0
 
 
@@ -165,9 +168,10 @@ def _attempt(
     every = _sets(k, table, entries, conditions)
     if isinstance(every, UnprovedTransition):
         return every
-    found, inflow = departing(loop, every, coupling, inflow, first_leaving(table, every, T))
+    leaving = first_leaving(table, every, T)
+    found, inflow = departing(loop, every, coupling, inflow, leaving)
     found = Departures(*((1.0 + OTHERWISE) * one for one in found))
-    departure, rate_departure, push, _ = (one.max(axis=0) for one in found)
+    departure, rate_departure, push = (one.max(axis=0) for one in found[:3])
     spare = np.array([(1.0 - SLACK) * sets.spare(found.position[:, i]) for i, sets in enumerate(every)])
     needed = least_distance(budget, loop.tracking, len(every))
     reached = np.empty((2, len(every)))
@@ -182,31 +186,46 @@ def _attempt(
             return UnprovedTransition(k, axis, "may exceed the limit of its rate")
         if not reached[1, axis] <= table[axis, ACCELERATION_LIMIT]:
             return UnprovedTransition(k, axis, "may exceed the limit of its acceleration")
-    effort = np.zeros(0) if limited is None else _effort(k, limited, every, found, budget)
-    if isinstance(effort, UnprovedTransition):
-        return effort
-    return ProvedTransition(table, entries, every, spare, departure, rate_departure, reached, effort, inflow)
+    effort, commanded = np.zeros(0), None
+    if limited is not None:
+        commanded = before.commanded if isinstance(before, ProvedTransition) else None
+        commanded = commanded or nothing_commanded(loop, len(every))
+        asked = _effort(k, limited, every, found, loop, commanded, leaving)
+        if isinstance(asked, UnprovedTransition):
+            return asked
+        effort, commanded = asked
+    return ProvedTransition(
+        table, entries, every, spare, departure, rate_departure, reached, effort, inflow, commanded
+    )
 
 
 def _effort(
-    k: int, limited: LimitedEfforts, every: Sequence[AxisSets], found: Departures, budget: Budget
-) -> FloatArray | UnprovedTransition:
+    k: int,
+    limited: LimitedEfforts,
+    every: Sequence[AxisSets],
+    found: Departures,
+    loop: AxisLoop,
+    before: CommandInflow,
+    leaving: int,
+) -> tuple[FloatArray, CommandInflow] | UnprovedTransition:
     """Return the largest efforts that robots are told to give in a transition, or which exceeds its limit.
 
     Robots compute them by masses that are too large by the model's error at most, from accelerations that
-    they command and from nominal rates, ``ahead`` of now.
+    they command and from nominal rates, ``ahead`` of now. What was commanded for the next transition, too.
     """
-    moving = np.stack([one.moving(len(found.pull) - 1, budget.period) for one in every], axis=-1)
+    budget, periods = loop.budget, len(found.pull) - 1
+    moving = np.stack([one.moving(periods, budget.period) for one in every], axis=-1)
     rates = moving[1] + max(budget.ahead - budget.period, 0.0) * moving[0]
     if rates.max() > QUICKEST:
         return UnprovedTransition(k, int(rates.max(axis=0).argmax()), "may turn too fast to bound efforts")
-    of, commands = limited.efforts, moving[0] + found.pull
-    turning = commands @ of.axes[k].T + np.einsum("tj,ejk,tk->te", rates, of.rates[k], rates)
-    damped = (rates @ of.damping.T).max(axis=0)
-    moved = limited.acceleration * of.push[k] + turning.max(axis=0)
-    effort: FloatArray = (1.0 + SLACK) * ((1.0 + budget.model_error) * moved + damped)
+    laws = np.stack([one.commands(periods) for one in every], axis=-1)
+    commands, commanded = largest_commands(loop, laws, moving[0], found.entered.T, before, leaving)
+    of, believed = limited.efforts, 1.0 + budget.model_error
+    turning = np.einsum("tj,ejk,tk->te", rates, of.rates[k], rates)
+    turned = (1.0 + OTHERWISE) * commands @ of.axes[k].T + believed * turning + rates @ of.damping.T
+    effort: FloatArray = (1.0 + SLACK) * (limited.acceleration * of.push[k] + turned.max(axis=0))
     if (effort <= of.limits).all():
-        return effort
+        return effort, commanded
     worst = int((effort / of.limits).argmax())
     said = f"{of.names[worst]} may be told to give {effort[worst]:.0f}, more than its {of.limits[worst]:.0f}"
     return UnprovedTransition(k, None, said)

@@ -46,6 +46,9 @@ class Loop(NamedTuple):
         old: Sums of those that are older, shape (p, 3).
         noise: What noise causes of e, e' and the pull, of every axis or of all, shape (p, axes or 1, 3).
         pushes: Largest |w| of every axis, or of all, shape (axes or 1,) [rad/s^2 or m/s^2].
+        direct: What it adds to a command at once [rad/s^2 or m/s^2].
+        factors: f of every part, shape (p,).
+        answers: Pull after a unit of command in one period, from the period after it on, shape (p, samples).
         errors: Largest |epsilon| of every part, shape (p, 1).
         spread: Largest |d| [-].
         started: Largest |e|, |e'| and |q| at all times after a unit of e' at the beginning, and in all
@@ -57,6 +60,9 @@ class Loop(NamedTuple):
     old: FloatArray
     noise: FloatArray
     pushes: FloatArray
+    direct: float
+    factors: FloatArray
+    answers: FloatArray
     errors: FloatArray
     spread: float
     started: FloatArray
@@ -90,7 +96,7 @@ def loop_of(tracking: AxisTracking, budget: Budget) -> Loop:
     e, v, a = np.zeros((3, 3, parts))  # runs: a command, a rate, a place
     v[1], e[2] = 1.0, 1.0
     past = deque([(0.0 * e, 0.0 * v)] * delay, maxlen=delay + 1)
-    command, started, largest, sizes = *np.zeros((3, 3, parts)), []
+    command, started, largest, sizes, pulls = *np.zeros((3, 3, parts)), [], []
     for k in range(ceil(HORIZON / T)):
         past.append((e, v))
         pull = -tracking.stiffness * past[0][0] - tracking.damping * past[0][1]
@@ -98,6 +104,7 @@ def loop_of(tracking: AxisTracking, budget: Budget) -> Loop:
         command += np.abs(found[:, 0])
         started = np.maximum(started, np.abs(found[:, 1]))
         largest = np.maximum(largest, np.abs(found[:, 0]) if k else np.array([0.0, 0.0, 1.0])[:, None])
+        pulls.append(pull[0].copy())
         sizes.append(T * mean_size(found[:, 1], found[:, 1] + T * found[:, 2]))
         if k == 0:
             pull[0] += 1.0
@@ -117,6 +124,9 @@ def loop_of(tracking: AxisTracking, budget: Budget) -> Loop:
         kicks[:, memory:].sum(axis=1),
         noise,
         budget.axis_acceleration_error + np.array(tracking.disturbance[1:] or (0.0,)),
+        tracking.stiffness * budget.angle_noise + tracking.damping * budget.rate_noise,
+        1.0 + errors,
+        np.array(pulls[1:]).T,
         np.abs(errors)[:, None] + spread,
         spread,
         (started + tracking.damping * delay * largest).T,
@@ -143,7 +153,7 @@ def resting(loop: Loop, axes: int) -> Entered:
 
 def departures(
     loop: Loop, coupling: FloatArray, moving: FloatArray, before: Entered, leaving: int
-) -> tuple[FloatArray, Entered]:
+) -> tuple[FloatArray, Entered, FloatArray]:
     """Return how far axes depart in every period of a transition, and what enters before the next one.
 
     Args:
@@ -155,7 +165,9 @@ def departures(
         leaving: The first sample at which the cell can be left.
 
     Returns:
-        Largest |e|, |e'|, |e''| and |q|, shape (periods + 1, 4, axes), the last one for ever; what enters.
+        Largest |e|, |e'|, |e''| and |q|, shape (periods + 1, 4, axes), the last one for ever; what entered
+        before the next one; and the largest acceleration that entered in every period, likewise, shape (p,
+        axes, periods + 1).
     """
     T, memory, ever = loop.budget.period, loop.recent.shape[1], len(moving) - 1
     entered = np.concatenate([before.recent, np.empty((*before.recent.shape[:3], ever + 1))], axis=3)
@@ -185,7 +197,8 @@ def departures(
     entered[..., memory + ever] = most
     ends = np.flip(np.maximum.accumulate(np.flip(entered, 3), axis=3), 3)
     first = min(leaving, ever + 1)
-    return found, Entered(ends[..., first : first + memory], largest, np.maximum(kept, state[2]))
+    following = Entered(ends[..., first : first + memory], largest, np.maximum(kept, state[2]))
+    return found, following, entered[0, ..., memory:]
 
 
 def _state(

@@ -23,7 +23,12 @@ from coop_drake.verification.budgets.alarms import alarms_of, check_axis_alarms
 from coop_drake.verification.budgets.axis_departure import Loop, departures, loop_of, resting
 from coop_drake.verification.budgets.axis_law import Axes, axes_of
 from coop_drake.verification.budgets.couplings import Coupled, couplings
-from coop_drake.verification.budgets.efforts import Asked, asked, check_stated_efforts
+from coop_drake.verification.budgets.efforts import (
+    Asked,
+    check_stated_efforts,
+    commanded,
+    nothing_given,
+)
 from coop_drake.verification.budgets.entering import entering, first_rest
 from coop_drake.verification.budgets.rate_room import check_rate_room
 from coop_drake.verification.budgets.staying import Closed, staying, tails
@@ -60,6 +65,7 @@ def check_budget(plan: Plan, tree: ComponentTree | None = None) -> Check | None:
     _check_friction(tracking, plan.budget, coupled)
     entered = resting(loop, plan.start.size - 2)
     smallest, count, entry, every = np.inf, 0, _start(plan), list[Asked]()
+    given = nothing_given(loop, plan.start.size - 2)
     for k, transition in enumerate(plan.transitions):
         stated, where = transition.tolerance, f"transitions[{k}]"
         if stated is None:
@@ -70,10 +76,13 @@ def check_budget(plan: Plan, tree: ComponentTree | None = None) -> Check | None:
             )
         _check_entry(stated, entry, f"{where}.tolerance")
         motion, entry = _check_motion(plan, k, stated, f"{where}.tolerance")
-        away, entered = departures(loop, coupled.rates[k, 1:], motion.moving, entered, motion.leaving)
+        rates = coupled.rates[k, 1:]
+        away, entered, flows = departures(loop, rates, motion.moving, entered, motion.leaving)
         _check_departures(transition, motion, away, tracking, f"{where}.tolerance")
         check_axis_alarms(alarms_of(plan), stated, plan.budget, tracking, f"{where}.tolerance")
-        every.append(asked(plan.budget, motion.moving, away[:, 3]))
+        if plan.budget.limited:
+            one, given = commanded(loop, motion.laws, motion.moving, flows, given, motion.leaving)
+            every.append(one)
         smallest, count = min(smallest, float(stated.distance.min())), count + stated.distance.size
     if plan.budget.limited:
         assert tree is not None  # a budget with limits has bodies
@@ -143,11 +152,13 @@ class _Motion(NamedTuple):
             axes).
         spare: Least distance to the funnels' bounds in every period, likewise, shape (periods + 1, axes).
         leaving: The first sample at which the cell can be left.
+        laws: Least and largest command of the law, likewise, shape (periods + 1, 2, axes).
     """
 
     moving: FloatArray
     spare: FloatArray
     leaving: int
+    laws: FloatArray
 
 
 def _check_departures(
@@ -257,13 +268,18 @@ def _motion(
         leaving: The first sample at which the cell can be left.
     """
     rows = np.repeat(ever[None], int(samples.max()) + 1, axis=0)
+    laws = np.repeat(np.stack([-ever[:1], ever[:1]], axis=1), len(rows), axis=0)
     for i, n in enumerate(samples):
         tube = made[:n, :, i]
         rows[:n, :, i] = np.column_stack([tube[:, 4], np.abs(tube[:, 2]) + tube[:, 3], tube[:, 5]])
+        laws[:n, :, i] = np.column_stack([tube[:, 6] - tube[:, 7], tube[:, 6] + tube[:, 7]])
+    commands = [laws[:, :, members == axis] for axis in range(int(members.max()) + 1)]
+    bounds = np.stack([[own[:, 0].min(axis=1), own[:, 1].max(axis=1)] for own in commands], axis=2)
     axes = [rows[:, :, members == axis] for axis in range(int(members.max()) + 1)]
     moving = np.stack([own[:, :2].max(axis=2) for own in axes], axis=2)
     moving[:, 1] += period * moving[:, 0]
-    return _Motion(moving, np.stack([own[:, 2].min(axis=1) for own in axes], axis=1), leaving)
+    spare = np.stack([own[:, 2].min(axis=1) for own in axes], axis=1)
+    return _Motion(moving, spare, leaving, bounds.transpose(1, 0, 2))
 
 
 def _middles(plan: Plan, k: int) -> FloatArray:

@@ -28,7 +28,7 @@ from coop_drake.verification.solids import Stage, component_stages
 IMAGINARY, STEP = 1e-30, 1e-5
 """Imaginary step, and step of the difference of first derivatives [rad or m]."""
 
-TIGHT, NEAR_ZERO = 1.035, 0.017
+ACCELERATIONS, EFFORTS = (1.035, 0.017), (1.008, 0.003)
 """Boxes are halved until a bound is at most so many times what is reached in its cell, or so much of the
 largest number of its kind more [-]."""
 
@@ -82,7 +82,7 @@ def couplings(budget: Budget, tree: ComponentTree, cells: tuple[Cell, ...]) -> C
     waves = _waves_of(functions, tree)
     kinds = np.repeat([0, 1, 2], [axes * axes, 2 * robots, n])
     lower, upper = (np.array([getattr(cell, side)[1:] for cell in cells]) for side in ("lower", "upper"))
-    most = _largest(lambda q, r: _solved(waves, size, n, q, r), lower, upper, kinds)
+    most = _largest(lambda q, r: _solved(waves, size, n, q, r), lower, upper, kinds, ACCELERATIONS)
     pushes = most[:, :, axes * axes : columns]
     return Coupled(
         most[:, :, : axes * axes].reshape(*rows, axes, axes),
@@ -157,7 +157,7 @@ def effort_shares(
         bound = np.hypot(length + first, across.sum(axis=3)) + left
         return np.maximum(length, length + first - left), bound, (along + across).max(axis=(1, 2))
 
-    most = _largest(sizes, lower - room[:, None], upper + room[:, None], kinds)
+    most = _largest(sizes, lower - room[:, None], upper + room[:, None], kinds, EFFORTS)
     rates = most[:, :, 1 + axes :].reshape(len(cells), len(givers), axes, axes)
     return most[:, :, 0], most[:, :, 1 : 1 + axes], rates
 
@@ -339,7 +339,9 @@ def _solved(
     return reached, bound, matters
 
 
-def _largest(bounds: _Waves, lower: FloatArray, upper: FloatArray, kinds: IntArray) -> FloatArray:
+def _largest(
+    bounds: _Waves, lower: FloatArray, upper: FloatArray, kinds: IntArray, precision: tuple[float, float]
+) -> FloatArray:
     """Return bounds over cells, shape (cells, rows, columns), from boxes that are halved until they suffice.
 
     Args:
@@ -347,6 +349,7 @@ def _largest(bounds: _Waves, lower: FloatArray, upper: FloatArray, kinds: IntArr
         lower: Lower ends of the joints' intervals, shape (cells, n).
         upper: Upper ends, shape (cells, n).
         kinds: The kind of every column, shape (columns,).
+        precision: When they suffice.
     """
     cell, q, r = np.arange(len(lower)), 0.5 * (lower + upper), 0.5 * (upper - lower)
     found = bounds(q, r)[0]
@@ -356,7 +359,7 @@ def _largest(bounds: _Waves, lower: FloatArray, upper: FloatArray, kinds: IntArr
         now, bound, matters = (np.concatenate(own) for own in zip(*parts, strict=True))
         np.maximum.at(found, cell, now)
         highest = np.stack([found[..., kinds == kind].max(axis=-1, initial=0.0) for kind in kinds], axis=-1)
-        tight = np.all(bound <= (TIGHT * found + NEAR_ZERO * highest)[cell], axis=(1, 2))
+        tight = np.all(bound <= (precision[0] * found + precision[1] * highest)[cell], axis=(1, 2))
         looked += cell.size
         if looked > MOST_BOXES:
             tight[:] = True

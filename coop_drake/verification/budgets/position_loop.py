@@ -20,7 +20,7 @@ from coop_drake.answers.position_tube import PositionTube
 from coop_drake.errors import RefusalError
 from coop_drake.tree.pose import FloatArray
 
-PARTS = 5
+PARTS = 10
 """Parts into which the range of the model's error is cut [-]."""
 
 HORIZON = 6.0
@@ -75,8 +75,10 @@ def position_bounds(tube: PositionTube, stiffness: float, damping: float, budget
     def bounds(wrong: FloatArray, speed: float) -> FloatArray:
         """Return |e| at samples, |e'|, |p'|, |u| and |p''|, shape (5, parts)."""
         entering = wrong * sums[COMMAND, :3] + budget.acceleration_error * sums[KICK, :3]
+        asked = (
+            entering[2] + wrong + speed * sums[STEP, 5]
+        ) / gain  # p_G leads the command, feedback included
         entering = entering + speed * sums[STEP, :3]
-        asked = (entering[2] + wrong + speed * sums[STEP, 3]) / gain
         off, fast = entering[:2] + rest * asked * sums[KICK, :2]
         pushed = (1.0 + budget.model_error) * asked + budget.acceleration_error
         fast = fast + budget.period / 2.0 * (pushed + speed * sums[STEP, 3])
@@ -102,7 +104,9 @@ def position_bounds(tube: PositionTube, stiffness: float, damping: float, budget
 
     off, fast, quick, asked, pushed = settled(tube.speed)
     between = budget.period**2 / 8.0 * (pushed + nominal)
-    still, single = settled(0.0)[0] + between, asked + (budget.single_noise - 1.0) * noise  # of one robot
+    single = asked + (budget.single_noise - 1.0) * noise  # of one robot, not of their mean
+    single = (1.0 + errors + rest) * single  # by its masses, which are as wrong as in this part
+    still = settled(0.0)[0] + between
     return np.array([value.max() for value in (off + between, fast, quick, still, single)])
 
 
@@ -145,14 +149,15 @@ def _sums(
     budget: Budget,
     errors: FloatArray,
 ) -> FloatArray:
-    """Return the sums of absolute responses, shape (4 runs, 5, parts).
+    """Return the sums of absolute responses, shape (4 runs, 6, parts).
 
-    They are those of e, e', feedback, nominal acceleration and nominal velocity.
+    They are those of e, e', feedback, nominal acceleration, nominal velocity, and the command, which is the
+    sum of feedback and nominal acceleration.
 
     The second run's are those to a unit of acceleration at all times, the fourth run's those to a unit of
     speed of p_G; the third run's are not used.
     """
-    T, sums = budget.period, np.zeros((4, 5, len(errors)))
+    T, sums = budget.period, np.zeros((4, 6, len(errors)))
     for found in _followed(tube, flow, stiffness, damping, budget, errors):
         sums[[COMMAND, STEP]] += np.abs(found[[COMMAND, STEP]])
         sums[KICK] += mean_size(found[KICK], found[KICK] + T * found[PLACE])
@@ -168,7 +173,7 @@ def _followed(
     budget: Budget,
     errors: FloatArray,
 ) -> Iterator[FloatArray]:
-    """Yield the responses of ``_sums`` sample by sample, each of shape (4 runs, 5, parts).
+    """Yield the responses of ``_sums`` sample by sample, each of shape (4 runs, 6, parts).
 
     Raises:
         RefusalError: The loop does not come to rest.
@@ -183,8 +188,8 @@ def _followed(
         old, old_rate = past[0]
         feedback = -tube.tracking_stiffness * old - tube.tracking_damping * old_rate
         nominal = -stiffness * (q - goal) - damping * w
-        yield np.stack(np.broadcast_arrays(p - q, v - w, feedback, nominal, w), axis=1)
         command = feedback + nominal
+        yield np.stack(np.broadcast_arrays(p - q, v - w, feedback, nominal, w, command), axis=1)
         if k == 0:
             command[COMMAND] += 1.0
         p, v, s = carried(p, v, s, command, 1.0 + errors, budget.lag, T)

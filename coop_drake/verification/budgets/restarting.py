@@ -16,7 +16,7 @@ from coop_drake.tree import ComponentTree
 from coop_drake.tree.pose import FloatArray
 from coop_drake.verification.budgets.axis_departure import HORIZON, Loop, departures, loop_of, resting
 from coop_drake.verification.budgets.couplings import couplings
-from coop_drake.verification.budgets.efforts import Asked, asked, efforts_asked
+from coop_drake.verification.budgets.efforts import Asked, efforts_asked, evenly_asked
 from coop_drake.verification.budgets.position import of_origin
 from coop_drake.verification.budgets.position_loop import may_rest
 from coop_drake.verification.checks import Check
@@ -67,9 +67,9 @@ def check_restart(plan: Plan, tree: ComponentTree) -> Check | None:
     moving = np.tile([[stated.acceleration], [stated.rate]], (memory + 1, 1, axes))
     least, every = np.inf, list[Asked]()
     for k, (cell, own) in enumerate(zip(plan.cells, stated.departures, strict=True)):
-        found, _ = departures(loop, terms[k], moving, resting(loop, axes), memory)
+        found, _, _ = departures(loop, terms[k], moving, resting(loop, axes), memory)
         away, fast, push, pull = found.max(axis=0) + started[:, None]
-        every.append(asked(budget, moving, np.tile(pull, (len(moving), 1))))
+        every.append(evenly_asked(loop, (stated.acceleration, stated.rate), pull))
         if own.shape != (axes,) or not (own >= away - ROUNDING).all():
             raise RefusalError(f"restart.departures[{k}]", f"the budget gives up to {away.max():.6g}")
         most = plan.transitions[k].gains.rate_limit

@@ -67,7 +67,7 @@ def tubes(
     before: FloatArray,
     rest: FloatArray,
 ) -> FloatArray:
-    """Return the tubes of all axes, shape (samples, 6, b).
+    """Return the tubes of all axes, shape (samples, 8, b).
 
     Args:
         motions: The axes.
@@ -78,7 +78,8 @@ def tubes(
         rest: Where the axes rest when they are handed over, shape (b,).
 
     Returns:
-        Per sample x, its reach, v, its reach, the largest |acceleration|, and the distance to the bounds.
+        Per sample x, its reach, v, its reach, the largest |acceleration|, the distance to the bounds, the
+        command and its reach.
     """
     T, count = motions.period, middle.shape[1]
     matrix, enters = motions.carry
@@ -87,7 +88,7 @@ def tubes(
     now, away = np.array([*middle, np.zeros(count)]), np.array([*reach, before])
     nothing = np.zeros(count)
     jump = -motions.command(0.0, rest, nothing, nothing, nothing)[0]
-    made = np.empty((samples, 6, count))
+    made = np.empty((samples, 8, count))
     for k in range(samples):
         u, slope, by_rate, size, most = motions.command(k * T, now[0], away[0], now[1], away[1])
         faded = motions.axes.left(k * T) * jump
@@ -97,7 +98,8 @@ def tubes(
             u, slope, by_rate = nothing, nothing, nothing
         weight[3 + k] = size
         fastest = np.maximum(np.abs(now[2]) + away[2], most)
-        made[k] = now[0], away[0], now[1], away[1], fastest, _distance(motions, k, now, away, fastest)
+        made[k, :5] = now[0], away[0], now[1], away[1], fastest
+        made[k, 5:] = _distance(motions, k, now, away, fastest), u, most - np.abs(u)
         used = responses[:, : 4 + k]
         answer = slope * used[0] + by_rate * used[1]
         answer[3 + k] = 1.0
