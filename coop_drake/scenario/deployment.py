@@ -283,7 +283,7 @@ class Deployment:
     Attributes:
         preset: The departures of a usual team, which the keys beside it replace one by one. ``mobile_base``:
             200 Hz, measurements 10 ms late with noise of 1 mm, 0.5 mrad and 0.01 /s, masses believed 20 % too
-            large, base forces up to 1000 N, actuators that lag by 5 ms, a fifth of the reports lost. A
+            large, base forces up to 650 N, actuators that lag by 5 ms, a fifth of the reports lost. A
             scenario that was read holds the departures themselves.
         control_rate: How often controllers compute a new effort, which is held in between; null for
             controllers in continuous time [Hz].

@@ -12,7 +12,7 @@ PRESETS: dict[Preset, dict[str, Any]] = {
         "control_rate": 200.0,
         "mass_error": 0.2,
         "measurements": {"position_noise": 0.001, "angle_noise": 0.0005, "rate_noise": 0.01, "delay": 0.01},
-        "actuators": {"base_force": 1000.0, "lag": 0.005},
+        "actuators": {"base_force": 650.0, "lag": 0.005},
         "messages": {"loss": 0.2},
     }
 }

@@ -79,7 +79,7 @@ def test_the_scenario_of_a_run_has_its_values_and_that_of_its_plan_what_a_plan_d
     assert deployment.mass_error == run.values["deployment.mass_error"]
     assert deployment.robots["*"].clock_error == run.values["deployment.robots.*.clock_error"]
     assert deployment.seed == run.seed
-    assert deployment.actuators.base_force == 1000.0  # of the preset that is set
+    assert deployment.actuators.base_force == 650.0  # of the preset that is set
     assert scenario.start.object.x == planned.start.object.x == 1.55
     assert planned.deployment.mass_error == 0.2
     assert made.planned_values(run) == {"start.object.x": 1.55}

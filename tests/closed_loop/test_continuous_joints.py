@@ -19,7 +19,7 @@ from tests.support.cli import invoke
 from tests.support.turret import write_turret
 
 SAMPLED = "deployment: {control_rate: 100}"
-BUDGET = "deployment: {preset: mobile_base, budget: all, actuators: {base_force: 1000}}"
+BUDGET = "deployment: {preset: mobile_base, budget: all}"
 
 
 class Wrapping(DirectExchange):
