@@ -17,7 +17,7 @@ from coop_drake.verification.budgets.axis_departure import departures, loop_of, 
 
 BUDGET = Budget(delay=0.01, lag=0.005, angle_noise=0.0015, rate_noise=0.03, model_error=0.2, axis_error=0.35)
 PERIODS, LEAVING = 120, 100
-LOOP = best_loop(BUDGET, 0.002)
+LOOP = best_loop(BUDGET, weight=0.002)
 NOTHING = np.zeros((1, 1, 1))
 
 
