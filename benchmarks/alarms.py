@@ -17,6 +17,7 @@ from coop_drake import Found, build_maps, load_scenario, plan
 from coop_drake.answers.plan import Plan
 from coop_drake.compiled_loop import prepare, run
 from coop_drake.errors import PlanError
+from coop_drake.laws.departure import unseen_time
 from coop_drake.laws.nominal_axes import lag_factors
 from coop_drake.laws.sampling import whole_periods
 from coop_drake.scenario import Scenario
@@ -85,7 +86,7 @@ def false_alarm_chance(scenario: Scenario, plan: Plan, robots: int, samples: int
     of_plane = _ratios(plan, pull, mean, np.array([position_std, velocity_std]), PLANE_DEVIATIONS)
     of_axis = np.array([measured.angle_noise, measured.rate_noise])
     gains = tracking.stiffness, tracking.damping
-    ratios = _ratios(plan, gains, of_axis, of_axis, DEVIATIONS)
+    ratios = _ratios(plan, gains, of_axis, of_axis, DEVIATIONS)[:2]
     in_plane = sum(_rayleigh(ratio) for ratio in of_plane) + _rayleigh(GRASP_DEVIATIONS)
     axes = 1 + len(plan.joint_names) / robots
     of_numbers = axes * sum(_normal(ratio) for ratio in ratios) + _normal(GRASP_DEVIATIONS)
@@ -95,7 +96,7 @@ def false_alarm_chance(scenario: Scenario, plan: Plan, robots: int, samples: int
 def _ratios(
     plan: Plan, gains: tuple[float, float], caused: np.ndarray, own: np.ndarray, deviations: float
 ) -> list[float]:
-    """Return how many standard deviations of what is measured a level leaves to noise, of x and x'.
+    """Return how many standard deviations a level leaves to noise, of measured x, x' and x + t x'.
 
     Args:
         plan: The plan.
@@ -106,15 +107,16 @@ def _ratios(
     """
     budget = plan.budget
     assert budget is not None
-    ratios = [np.inf, np.inf]
+    ahead, ratios = (
+        unseen_time(budget.delay, budget.report_age, budget.period, budget.age_error),
+        [np.inf] * 3,
+    )
     for error in (-budget.model_error, 0.0, budget.model_error):
-        responses = _responses(gains, 1.0 + error, budget.period, budget.lag, budget.delay)
-        for i, h in enumerate(responses):
-            bound = deviations * (np.dot(gains, caused) * np.abs(h).sum() + own[i])
-            spread = (
-                sqrt((gains[0] * caused[0]) ** 2 + (gains[1] * caused[1]) ** 2) * sqrt(float(h @ h)) + own[i]
-            )
-            ratios[i] = min(ratios[i], bound / spread)
+        x, v = _responses(gains, 1.0 + error, budget.period, budget.lag, budget.delay)
+        for i, (h, errors) in enumerate(((x, own[:1]), (v, own[1:]), (x + ahead * v, own * [1.0, ahead]))):
+            bound = deviations * (np.dot(gains, caused) * np.abs(h).sum() + errors.sum())
+            pulled = sqrt((gains[0] * caused[0]) ** 2 + (gains[1] * caused[1]) ** 2) * sqrt(float(h @ h))
+            ratios[i] = min(ratios[i], bound / (pulled + np.hypot.reduce(errors)))
     return ratios
 
 

@@ -19,6 +19,7 @@ class Alarms:
     Attributes:
         position: Of the object's measured position, the length of the vector [m].
         velocity: Of its measured velocity, likewise [m/s].
+        ahead: Of where both together take it until a report is used that knows of it, likewise [m].
         axis_reserve: What must be left of the distance of a nominal axis (theta, q...) to its funnel's bounds
             beside its level, shape (1 + n,), empty where the budget has no axes [rad or m].
         grasp: Of the distance of a grasp from where the measured pose of the base has it; null where the
@@ -28,6 +29,7 @@ class Alarms:
 
     position: _Exact
     velocity: _Exact
+    ahead: _Exact
     axis_reserve: Vector
     grasp: _Exact | None = None
     turn: _Exact | None = None

@@ -25,6 +25,8 @@ class PositionTube:
         rest: Largest distance from the nominal position after both have come to rest [m].
         acceleration: Largest acceleration that a robot commands for the object's origin, times the factor by
             which its masses may be too large: its forces over the true mass [m/s^2].
+        ahead: Largest distance e + t e' to which its departures e and e' at a sample would take it within the
+            time t for which nobody may know of them, see ``laws/departure.py`` [m].
     """
 
     tracking_stiffness: _Exact
@@ -35,3 +37,4 @@ class PositionTube:
     velocity: _NotNegative
     rest: _NotNegative
     acceleration: _NotNegative
+    ahead: _NotNegative

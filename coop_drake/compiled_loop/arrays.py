@@ -82,7 +82,8 @@ class LoopNominal(NamedTuple):
             tube [m], and the largest departure of the velocity [m/s], shape (4,).
         axis_gains: K_a [1/s^2], zeta_a [1/s] and the lag of the nominal axes [s], shape (3,) or (0,).
         mountings: Those of all robots, see ``place_on_axes``, shape (M,).
-        levels: Of the robots' monitors, see ``largest_departure``, shape (4,) or (0,).
+        levels: Of the robots' monitors, see ``largest_departure``, shape (5,) or (0,).
+        unseen: t there [s].
         axis_alarms: Levels of all axes and of their rates in every cell, shape (C, 2, M) or (C, 2, 0).
         reserves: What must be left of the distances of all axes to their funnels' bounds, shape (M,) or (0,).
         distances: Least distances of (theta, q) to the bounds of their funnels that the budget states for
@@ -95,6 +96,7 @@ class LoopNominal(NamedTuple):
     axis_gains: FloatArray
     mountings: FloatArray
     levels: FloatArray
+    unseen: float
     axis_alarms: FloatArray
     reserves: FloatArray
     distances: FloatArray

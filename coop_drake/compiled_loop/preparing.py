@@ -249,6 +249,7 @@ def _nominal(plan: Plan, team: TeamPlant, knowledge: Sequence[RobotKnowledge]) -
         gains,
         mountings,
         monitored[0].levels if monitored else none,
+        monitored[0].unseen if monitored else 0.0,
         np.ascontiguousarray(np.concatenate(of_axes, axis=2)),
         np.concatenate([none, *(one.axis_reserve for one in monitored)]),
         np.array(distances) if motion is not None else np.empty((0, 0, 0)),

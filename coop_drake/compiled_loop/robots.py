@@ -303,7 +303,7 @@ def judge(
     chain = team.chains[team.first[0, k] : team.first[0, k + 1]]
     mounting = nominal.mountings[begin : begin + size]
     share, which = largest_departure(
-        chain, team.loads[k], mounting, robot, room.seen[0], led, axes, nominal.levels, levels
+        chain, team.loads[k], mounting, robot, room.seen[0], led, axes, nominal.levels, levels, nominal.unseen
     )
     alarms[0], alarms[1], alarms[2] = alarm_at(share, now, alarms[3]), share, which
     if share > 1.0:

@@ -13,6 +13,7 @@ from coop_drake.errors import PlanError, ScenarioError
 from coop_drake.geometry.boundary import BoundaryDistance
 from coop_drake.harmonic_maps import HarmonicMap, VelocityField
 from coop_drake.laws.arrival import ArrivalGoal
+from coop_drake.laws.departure import unseen_time
 from coop_drake.laws.disturbance import observer_gains
 from coop_drake.laws.governor import FIELD_SPEED, slowdown_radius
 from coop_drake.laws.sampling import whole_periods
@@ -184,8 +185,8 @@ def _monitored(
     scenario: Scenario, plan: Plan, team: TeamPlant, robot: RobotModel, age: int
 ) -> MonitoredRobot | None:
     """Return what a robot's monitor of departures needs, None where the plan has no budget."""
-    deployment, alarms = scenario.deployment, plan.alarms
-    if alarms is None or deployment.period is None:
+    deployment, alarms, budget = scenario.deployment, plan.alarms, plan.budget
+    if alarms is None or budget is None or deployment.period is None:
         return None
     own = [0, *range(1 + robot.q_slice.start, 1 + robot.q_slice.stop)]
     stated = [one.tolerance for one in plan.transitions if one.tolerance is not None]
@@ -197,9 +198,10 @@ def _monitored(
         levels=np.array(
             [
                 inf if one is None else one
-                for one in (alarms.position, alarms.velocity, alarms.grasp, alarms.turn)
+                for one in (alarms.position, alarms.velocity, alarms.grasp, alarms.turn, alarms.ahead)
             ]
         ),
+        unseen=unseen_time(budget.delay, budget.report_age, budget.period, budget.age_error),
         axis_alarms=axis_alarms if stated else np.empty((len(plan.cells), 2, 0)),
         axis_reserve=alarms.axis_reserve[own] if stated else np.empty(0),
         start=plan.start[[0, 1, *(2 + i for i in own)]],

@@ -39,10 +39,16 @@ BRAKING = 2.0
 QUIET, ASKS, BRAKES = 0.0, 1.0, 2.0
 """What a monitor says: nothing, that the team be held, or that the drives brake."""
 
-POSITION, VELOCITY, GRASP, TURN = range(4)
+POSITION, VELOCITY, GRASP, TURN, AHEAD = range(5)
 """Levels that all transitions of a plan have in common."""
 
-NAMES = ("the object's position", "the object's velocity", "its grasp", "the angle of its base")
+NAMES = (
+    "the object's position",
+    "the object's velocity",
+    "its grasp",
+    "the angle of its base",
+    "where the object goes",
+)
 """What they are levels of."""
 
 
@@ -100,11 +106,11 @@ def axis_level(alarm: float, reserve: float, position: float, lower: float, uppe
 @compiled
 def largest_departure(
     chain: FloatArray, p_LE: FloatArray, mounting: FloatArray, robot: FloatArray, seen: FloatArray,
-    led: FloatArray, axes: FloatArray, levels: FloatArray, axis_levels: FloatArray,
+    led: FloatArray, axes: FloatArray, levels: FloatArray, axis_levels: FloatArray, unseen: float,
 ) -> tuple[float, int]:  # fmt: skip
     """Return the largest measured departure over its level [-], and the number of this level.
 
-    The first four levels are those above, then come those of all axes (theta, q_k), then those of their
+    The first five levels are those above, then come those of all axes (theta, q_k), then those of their
     rates. An axis whose level is not positive departs infinitely.
 
     Args:
@@ -115,8 +121,10 @@ def largest_departure(
         seen: What ``estimate_object`` makes of it and of the measured pose, shape (6,).
         led: p^ and p^' when this was measured, shape (4,) or longer.
         axes: x^ and x^' then, shape (2, 1 + n) or more rows; shape (2, 0) where they have no nominal motion.
-        levels: Of position, velocity, grasp and angle of the base, infinite where there is none, shape (4,).
+        levels: Of position, velocity, grasp, angle of the base, infinite where there is none, and of where
+            the position goes, shape (5,).
         axis_levels: Of the axes then, and of their rates, of the shape of ``axes``.
+        unseen: t, how far ahead that is [s].
     """
     largest, which, n = 0.0, POSITION, mounting.size - 1
     motion, last = move_chain(chain, robot), chain.shape[0] - 1
@@ -124,11 +132,14 @@ def largest_departure(
     turn = robot[2] - seen[2] - mounting[0]
     for i in range(n):
         turn -= mounting[1 + i] * robot[3 + i]
-    for number in range(4):
+    e_x, e_y, v_x, v_y = seen[0] - led[0], seen[1] - led[1], seen[3] - led[2], seen[4] - led[3]
+    for number in range(5):
         if number == POSITION:
-            away = hypot(seen[0] - led[0], seen[1] - led[1])
+            away = hypot(e_x, e_y)
         elif number == VELOCITY:
-            away = hypot(seen[3] - led[2], seen[4] - led[3])
+            away = hypot(v_x, v_y)
+        elif number == AHEAD:
+            away = hypot(e_x + unseen * v_x, e_y + unseen * v_y)
         elif number == GRASP:
             slipped_x = robot[0] + motion[last, PX] - seen[0] - rx
             away = hypot(slipped_x, robot[1] + motion[last, PY] - seen[1] - ry)
@@ -144,7 +155,7 @@ def largest_departure(
             away, level = abs(measured - axes[row, i]), axis_levels[row, i]
             share = away / level if level > 0.0 else inf
             if share > largest:
-                largest, which = share, 4 + row * axes.shape[1] + i
+                largest, which = share, 5 + row * axes.shape[1] + i
     return largest, which
 
 

@@ -32,7 +32,9 @@ class MonitoredRobot:
         chain: From the robot's base to its end effector.
         p_LE: The grasp in L, shape (2,) [m].
         mounting: See ``place_on_axes``, shape (1 + n,).
-        levels: Of position, velocity, grasp and angle of the base, infinite where there is none, shape (4,).
+        levels: Of position, velocity, grasp, angle of the base, infinite where there is none, and of where
+            the position goes, shape (5,).
+        unseen: How far ahead that is [s].
         axis_alarms: Of the axes (theta, q_k) in every cell, and of their rates, shape (cells, 2, 1 + n), or
             (cells, 2, 0) where they have no nominal motion.
         axis_reserve: What must be left of an axis' distance to its funnel's bounds, shape (1 + n,) or (0,).
@@ -46,6 +48,7 @@ class MonitoredRobot:
     p_LE: FloatArray  # noqa: N815
     mounting: FloatArray
     levels: FloatArray
+    unseen: float
     axis_alarms: FloatArray
     axis_reserve: FloatArray
     start: FloatArray
@@ -125,7 +128,8 @@ class DepartureMonitor(Block):
         measured, seen = self._state.Eval(context), np.empty(6)
         self._estimate(measured, self._pose.Eval(context), seen)
         axes, levels = then[4:].reshape(2, 2, -1) if self._axes else np.empty((2, 2, 0))
-        share, which = self._largest(measured, seen, then[:4].copy(), axes, self._robot.levels, levels)
+        known = self._robot.levels, levels, self._robot.unseen
+        share, which = self._largest(measured, seen, then[:4].copy(), axes, *known)
         output.SetFromVector([alarm_at(share, context.get_time(), float(past[0])), share, float(which)])
 
     def _remember(self, context: Context, discrete_state: DiscreteValues) -> EventStatus:

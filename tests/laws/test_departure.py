@@ -48,9 +48,9 @@ def test_no_robot_is_ready_while_its_monitor_is_not_quiet():
 
 
 def test_levels_have_names():
-    names = [departing_name(check, ("shoulder", "elbow")) for check in range(10)]
-    assert names[:5] == [
+    names = [departing_name(check, ("shoulder", "elbow")) for check in range(11)]
+    assert names[:6] == [
         "the object's position", "the object's velocity", "its grasp", "the angle of its base",
-        "the object's angle",
+        "where the object goes", "the object's angle",
     ]  # fmt: skip
-    assert names[5:] == ["shoulder", "elbow", *[f"the rate of {n}" for n in (names[4], "shoulder", "elbow")]]
+    assert names[6:] == ["shoulder", "elbow", *[f"the rate of {n}" for n in (names[5], "shoulder", "elbow")]]

@@ -13,8 +13,10 @@ from coop_drake.answers import Plan
 from coop_drake.answers.budget import Budget
 from coop_drake.laws import ScheduledGains
 from coop_drake.laws.nominal import nominal_flow
+from coop_drake.planning.budget.alarms import alarms_of, position_room, unseen_of
 from coop_drake.planning.budget.position_fit import UnprovedPosition, commanded_accelerations, fit_position
 from coop_drake.planning.budget.position_tube import PositionGains, position_tubes
+from coop_drake.planning.duration import plan_time
 from coop_drake.planning.transitions import with_gains
 from coop_drake.plant import planning_problem
 from tests.support.small_loop import small_problem
@@ -64,6 +66,7 @@ def test_random_disturbances_stay_in_the_tube_and_rest_nearer(name):
         run_position(flow, row, budget.period, delay, budget.lag, factor, disturbances, motion)
         assert np.abs(motion[:, 0] - motion[:, 2]).max() <= tube.radius
         assert np.abs(motion[:, 1] - motion[:, 3]).max() <= tube.rate
+        assert np.abs((motion @ [1.0, unseen_of(budget), -1.0, -unseen_of(budget)])).max() <= tube.ahead
         assert np.abs(motion[-200:, 0] - motion[-200:, 2]).max() <= tube.rest + 1e-4
 
 
@@ -115,6 +118,30 @@ def test_clocks_that_are_wrong_by_several_periods_leave_no_tube():
     assert position_tubes([GAINS], replace(BUDGET, clock_error=0.05)) == [None]
 
 
+@pytest.mark.parametrize("clock_error", [0.0, 5e-4])
+def test_whatever_departs_below_all_levels_stays_in_its_room_until_a_report_tells_of_it(clock_error):
+    """It may be as far and as fast as measurements with the worst noise just do not show."""
+    budget, generator = replace(BUDGET, clock_error=clock_error), np.random.default_rng(4)
+    (tube,) = position_tubes([GAINS], budget)
+    alarms, room, t = alarms_of(budget, tube, None, 1), position_room(budget, tube), unseen_of(budget)
+    assert (
+        alarms.velocity * t > room - alarms.position > 0.0
+    )  # by its velocity alone it would be seen too late
+    farthest = 0.0
+    for _ in range(2000):
+        e, v, noise, rate_noise = (generator.uniform(-1.0, 1.0, 4) ** 3) * [0.05, 1.5, 0.0, 0.0] + [
+            0.0, 0.0, *generator.choice([-1.0, 1.0], 2) * [budget.position_noise, budget.velocity_noise]
+        ]  # fmt: skip
+        x, rate = e + noise, v + rate_noise
+        if abs(x) > alarms.position or abs(x + t * rate) > alarms.ahead or abs(rate) > alarms.velocity:
+            continue
+        s = np.linspace(0.0, t, 9)
+        away = np.abs(e + s * v + 0.5 * budget.acceleration_error * s**2 * np.sign(e + t * v)).max()
+        assert away <= room
+        farthest = max(farthest, away)
+    assert farthest > (0.9 if clock_error == 0.0 else 0.8) * room
+
+
 def test_without_departures_the_tube_is_what_sampling_leaves():
     (tube,) = position_tubes([GAINS], Budget())
     assert tube.radius < 0.005
@@ -161,13 +188,15 @@ def test_slower_motion_is_chosen_where_accelerations_are_limited():
     problem, gains = planning_problem(scenario), ScheduledGains()
     accelerations = commanded_accelerations(problem, plan, gains, BUDGET)
     assert accelerations == sorted(set(accelerations), reverse=True)
-    speeds = []
+    times, speeds = [], []
     for most in (accelerations[0], accelerations[-1], 15.0):
         found = fit_position(problem, plan, gains, BUDGET, most)
         assert isinstance(found, Plan)
         assert found.tube.acceleration <= most
         speeds.append(found.tube.speed)
-    assert speeds[0] > speeds[1] > speeds[2]
+        times.append(plan_time(found))
+    assert times[0] < times[1] < times[2]
+    assert max(speeds[:2]) > speeds[2]
 
 
 def test_a_cell_that_is_too_narrow_is_named():

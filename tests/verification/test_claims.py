@@ -121,6 +121,7 @@ FREE = {
     "tube.velocity": Free(SAFE + ", and at most the limit of the object's speed", (0.99, 100.0)),
     "tube.rest": Free(SAFE + ", and less than the goal's tolerance", (0.99, 2.0)),
     "tube.acceleration": Free(SAFE, (0.99,)),
+    "tube.ahead": Free(SAFE + ", and at most what its level leaves", (0.99, 1.01)),
     "restart": Free("may be left out: then nothing is promised about teams whose drives braked"),
     "restart.rate": Free("with which the stated departures follow, below the limits of rates", (1.5, 20.0)),
     "restart.acceleration": Free("likewise, below the limits of accelerations", (2.0, 100.0)),

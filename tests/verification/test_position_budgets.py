@@ -52,7 +52,9 @@ def test_both_computations_agree(delay, lag, error, clock):
     budget = replace(BUDGET, delay=delay, lag=lag, model_error=error, clock_error=clock)
     gains = PositionGains(120.0, 15.0, 200.0, 26.0, 0.6)
     (tube,) = position_tubes([gains], budget)
-    stated = np.array([tube.radius, tube.rate, tube.velocity, tube.rest, tube.acceleration]) / (1.0 + SLACK)
+    stated = np.array([tube.radius, tube.rate, tube.velocity, tube.rest, tube.acceleration, tube.ahead]) / (
+        1.0 + SLACK
+    )
     np.testing.assert_allclose(position_bounds(tube, 120.0, 15.0, budget), stated, rtol=2e-4)
 
 
@@ -67,7 +69,7 @@ def test_a_larger_budget_is_refused(name):
     assert "tube" in refusal(replace(plan(), budget=replace(plan().budget, **{name: LARGER[name]})))
 
 
-@pytest.mark.parametrize("name", ["radius", "rate", "velocity", "rest", "acceleration"])
+@pytest.mark.parametrize("name", ["radius", "rate", "velocity", "rest", "acceleration", "ahead"])
 def test_a_narrower_tube_is_refused(name):
     tube = replace(plan().tube, **{name: 0.99 * getattr(plan().tube, name)})
     assert refusal(replace(plan(), tube=tube)) == f"tube.{name}"

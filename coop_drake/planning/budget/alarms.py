@@ -31,12 +31,17 @@ def axis_errors(budget: Budget, tracking: AxisTracking, axes: int) -> FloatArray
 def position_room(budget: Budget, tube: PositionTube) -> float:
     """Return how far the object may be off its nominal position while no report tells of it [m].
 
+    Where it is now is one end of the straight way that its rate shows, and its end the other one.
+
     Args:
         budget: The budget, see ``rubbed``.
         tube: The tube of the object's position.
     """
-    grown = growth(budget.velocity_noise, budget.acceleration_error, _unseen(budget))
-    return _position_level(budget, tube) + budget.position_noise + budget.age_error * tube.velocity + grown
+    unseen, mistaken_rate = unseen_of(budget), _mistaken_rate(budget, tube)
+    here = _position_level(budget, tube) + budget.position_noise
+    there = _level_ahead(budget, tube) + budget.position_noise + unseen * budget.velocity_noise
+    wrong = budget.age_error * tube.velocity + unseen * mistaken_rate
+    return max(here, there) + wrong + 0.5 * budget.acceleration_error * unseen**2
 
 
 def mistaken(budget: Budget, tracking: AxisTracking, axes: int) -> FloatArray:
@@ -48,7 +53,7 @@ def mistaken(budget: Budget, tracking: AxisTracking, axes: int) -> FloatArray:
 
 def axis_reserve(budget: Budget, tracking: AxisTracking, axes: int) -> FloatArray:
     """Return what noise and growth need beside the level of every axis (theta, q...), shape (axes,)."""
-    errors, time = axis_errors(budget, tracking, axes), _unseen(budget)
+    errors, time = axis_errors(budget, tracking, axes), unseen_of(budget)
     grown = np.array([growth(budget.rate_noise, error, time) for error in errors.tolist()])
     reserve: FloatArray = budget.angle_noise + grown + mistaken(budget, tracking, axes)[0]
     return reserve
@@ -80,11 +85,10 @@ def alarms_of(budget: Budget, tube: PositionTube, tracking: AxisTracking | None,
         tracking: How axes are pulled to their nominal motions, None where the budget has no axes.
         axes: Number of axes (theta, q...).
     """
-    fastest = (1.0 + budget.model_error) * tube.acceleration + budget.acceleration_error
-    mistaken_rate = budget.age_error * fastest
     return Alarms(
         _position_level(budget, tube),
-        tube.rate + budget.single_noise * budget.velocity_noise + mistaken_rate,
+        tube.rate + budget.single_noise * budget.velocity_noise + _mistaken_rate(budget, tube),
+        _level_ahead(budget, tube),
         np.empty(0) if tracking is None else axis_reserve(budget, tracking, axes),
         budget.grasp_noise,
         budget.turn_noise,
@@ -95,5 +99,17 @@ def _position_level(budget: Budget, tube: PositionTube) -> float:
     return tube.radius + budget.single_noise * budget.position_noise + budget.age_error * tube.velocity
 
 
-def _unseen(budget: Budget) -> float:
+def _level_ahead(budget: Budget, tube: PositionTube) -> float:
+    unseen = unseen_of(budget)
+    noise = budget.single_noise * (budget.position_noise + unseen * budget.velocity_noise)
+    return tube.ahead + noise + budget.age_error * tube.velocity + unseen * _mistaken_rate(budget, tube)
+
+
+def _mistaken_rate(budget: Budget, tube: PositionTube) -> float:
+    """Return by how much the object's velocity is measured wrongly as ages are wrong [m/s]."""
+    return budget.age_error * ((1.0 + budget.model_error) * tube.acceleration + budget.acceleration_error)
+
+
+def unseen_of(budget: Budget) -> float:
+    """Return how long nobody may know of a departure, see ``unseen_time`` [s]."""
     return unseen_time(budget.delay, budget.report_age, budget.period, budget.age_error)

@@ -182,7 +182,7 @@ def _fastest(
 def _tubes(
     stiffness: float, gain_set: ScheduledGains, budget: Budget
 ) -> tuple[tuple[PositionTube, ...], ...]:
-    """Return the tubes of all gains for each speed of p_G with which a loop is stable, the narrowest first.
+    """Return the tubes of all gains for each speed of p_G with which a loop is stable, the least room first.
 
     They are needed again where the axes have been fitted.
     """
@@ -195,7 +195,9 @@ def _tubes(
     ]
     stable = [tube for tube in position_tubes(choices, budget) if tube is not None]
     of_speed = ([tube for tube in stable if tube.speed == speed] for speed in SPEEDS)
-    return tuple(tuple(sorted(tubes, key=lambda tube: tube.radius)) for tubes in of_speed if tubes)
+    return tuple(
+        tuple(sorted(tubes, key=lambda tube: position_room(budget, tube))) for tubes in of_speed if tubes
+    )
 
 
 def _narrowest_allowed(

@@ -32,6 +32,7 @@ from coop_drake.answers.budget import Budget
 from coop_drake.answers.position_tube import PositionTube
 from coop_drake.jit import compiled
 from coop_drake.laws.sampling import whole_periods
+from coop_drake.planning.budget.alarms import unseen_of
 from coop_drake.tree.pose import FloatArray
 
 MODEL_PARTS = 10
@@ -51,6 +52,9 @@ SLACK = 1e-3
 E, V, S, Q, R = range(5)
 """State: e [m], e' [m/s], s [m/s^2], p^ - p_G [m], p^' [m/s]; then older e, e' for a delay."""
 
+
+AHEAD = 6
+"""Row of e + t e' among responses."""
 
 Loop = tuple[float, float, float, float]
 """K, zeta, K_t and zeta_t."""
@@ -87,7 +91,7 @@ def position_tubes(gains: Sequence[PositionGains], budget: Budget) -> list[Posit
         gains: The choices.
         budget: The departures to be tolerated.
     """
-    worst: list[FloatArray | None] = [np.zeros(5) for _ in gains]
+    worst: list[FloatArray | None] = [np.zeros(6) for _ in gains]
     for error in position_errors(budget):
         sums = {loop: _sums_of(loop, budget, error) for loop in dict.fromkeys(own.loop for own in gains)}
         for i, own in enumerate(gains):
@@ -110,7 +114,7 @@ def _stated(gains: PositionGains, bounds: FloatArray) -> PositionTube:
 
 
 def _bounds(gains: PositionGains, budget: Budget, sums: FloatArray | None, error: float) -> FloatArray | None:
-    """Return radius, rate, velocity, rest and acceleration, (5,), from the sums of responses (6, 3).
+    """Return radius, rate, velocity, rest, acceleration and what is ahead, (6,), from sums of responses (7, 3).
 
     Part of the error of the model is a disturbance of at most ``rest`` times the command itself, which the
     command's bound must allow for. A step of p_G moves the nominal acceleration and then the feedback, whose
@@ -124,16 +128,16 @@ def _bounds(gains: PositionGains, budget: Budget, sums: FloatArray | None, error
     still = _with_clocks(gains, budget, sums, rest, 0.0)
     if moving is None or still is None:
         return None
-    radius, rate, velocity, command, acceleration = moving
+    radius, rate, velocity, command, acceleration, ahead = moving
     between = budget.period**2 / 8.0 * (acceleration + gains.speed * sums[3, 2])
     own = (1.0 + error + rest) * (command + (budget.single_noise - 1.0) * noise)
-    return np.array([radius + between, rate, velocity, still[0] + between, own])
+    return np.array([radius + between, rate, velocity, still[0] + between, own, ahead])
 
 
 def _with_clocks(
     gains: PositionGains, budget: Budget, sums: FloatArray, rest: float, speed: float
 ) -> FloatArray | None:
-    """Return bounds of e at samples, e', p', of the command and of p'', shape (5,), for a speed of p_G.
+    """Return bounds of e at samples, e', p', the command, p'' and e + t e', shape (6,), for a speed of p_G.
 
     They grow with what noise adds to a command, and where ages are wrong this grows with |p'| and |p''|; None
     where there is no end to it.
@@ -149,11 +153,11 @@ def _with_clocks(
         moving = noise * sums[:, 0] + budget.acceleration_error * sums[:, 1] + speed * sums[:, 2]
         led = noise * (1.0 + sums[2, 0]) + budget.acceleration_error * sums[2, 1] + speed * sums[5, 2]
         command = led / (1.0 - rest * sums[2, 1])
-        away, rate = moving[:2] + rest * command * sums[:2, 1]
+        away, rate, ahead = (moving + rest * command * sums[:, 1])[[E, V, AHEAD]]
         acceleration = (1.0 + budget.model_error) * command + budget.acceleration_error
         rate += T / 2.0 * (acceleration + nominal)
         velocity = speed * sums[4, 2] + rate + T / 2.0 * nominal
-        return np.array([away, rate, velocity, command, acceleration])
+        return np.array([away, rate, velocity, command, acceleration, ahead])
 
     def mistaken(found: FloatArray) -> float:
         return budget.age_error * float(stiff * found[2] + damped * found[4])
@@ -167,28 +171,31 @@ def _with_clocks(
 def _sums_of(loop: Loop, budget: Budget, error: float) -> FloatArray | None:
     """Return ``response_sums`` of a loop with one error of the model; None where it is not stable."""
     T, delay = budget.period, whole_periods(budget.delay, budget.period)
-    sums, left = response_sums(T, *position_loop(loop, T, delay, budget.lag, error), ceil(HORIZON / T))
+    parts = position_loop(loop, T, delay, budget.lag, error)
+    sums, left = response_sums(T, unseen_of(budget), *parts, ceil(HORIZON / T))
     return sums if left < LEFT else None
 
 
 @compiled
 def response_sums(
     T: float,
+    unseen: float,
     matrix: FloatArray,
     held: FloatArray,
     feedback: FloatArray,
     nominal: FloatArray,
     samples: int,
 ) -> tuple[FloatArray, float]:
-    """Return the sums of |h|, shape (6, 3), and the largest response that is left.
+    """Return the sums of |h|, shape (7, 3), and the largest response that is left.
 
-    Rows: e, e', feedback, nominal acceleration, p^', sum of feedback and nominal acceleration. Columns: for a
-    unit of command in each period, for a unit of acceleration w, of speed of p_G. A disturbance w within a
-    period acts on the sample after it by (T - t) on e and by 1 on e'; |h_e (T - t) + h_v| is convex in t, so
-    that its chord is above it.
+    Rows: e, e', feedback, nominal acceleration, p^', sum of feedback and nominal acceleration, and e + t e'.
+    Columns: for a unit of command in each period, for a unit of acceleration w, of speed of p_G. A
+    disturbance w within a period acts on the sample after it by (T - t) on e and by 1 on e'; |h_e (T - t) +
+    h_v| is convex in t, so that its chord is above it.
 
     Args:
         T: Control period [s].
+        unseen: t [s].
         matrix: Of one period, see ``position_loop``, shape (5 + 2 delay, 5 + 2 delay); so are the others.
         held: Response to a unit command held for a period, shape (5 + 2 delay,).
         feedback: What the state adds to the command, shape (5 + 2 delay,).
@@ -198,16 +205,16 @@ def response_sums(
     size = len(held)
     state, after = np.zeros((size, 4)), np.zeros((size, 4))
     state[:, 0], state[V, 1], state[E, 2], state[Q, 3] = held, 1.0, 1.0, -1.0
-    sums, h, left = np.zeros((6, 3)), np.zeros((6, 4)), np.inf
+    sums, h, left = np.zeros((7, 3)), np.zeros((7, 4)), np.inf
     for _ in range(samples):
-        h[0], h[1], h[4] = state[E], state[V], state[R]
+        h[0], h[1], h[4], h[AHEAD] = state[E], state[V], state[R], state[E] + unseen * state[V]
         h[2:4] = 0.0
         for i in range(size):
             for c in range(4):
                 h[2, c] += feedback[i] * state[i, c]
                 h[3, c] += nominal[i] * state[i, c]
         h[5] = h[2] + h[3]
-        for i in range(6):
+        for i in range(7):
             sums[i, 0] += abs(h[i, 0])
             sums[i, 1] += 0.5 * T * (abs(h[i, 2] * T + h[i, 1]) + abs(h[i, 1]))
             sums[i, 2] += T * abs(h[i, 3])

@@ -7,8 +7,6 @@ does not know of it, must still be where the certificates are: the object in its
 
 from __future__ import annotations
 
-from math import ceil
-
 import numpy as np
 
 from coop_drake.answers.alarms import Alarms
@@ -19,6 +17,7 @@ from coop_drake.answers.position_tube import PositionTube
 from coop_drake.errors import RefusalError
 from coop_drake.tree.pose import FloatArray
 from coop_drake.verification.budgets.axis_departure import mistaken
+from coop_drake.verification.budgets.position_loop import unseen_in
 
 ROUNDING = 1e-9
 """Differences that rounding explains [m, rad, and per second]."""
@@ -59,8 +58,12 @@ def check_alarms(alarms: Alarms, tube: PositionTube, budget: Budget) -> float:
             _check(stated, noise, f"alarms.{name}")
     if not budget.axes and alarms.axis_reserve.size:
         raise RefusalError("alarms.axis_reserve", "is stated, but the plan has no budget for the axes")
-    unnoticed = budget.position_noise + late * tube.velocity
-    return alarms.position + unnoticed + _grows(budget, budget.velocity_noise, budget.acceleration_error)
+    time, wrong = unseen_in(budget), late * tube.velocity
+    further = budget.position_noise + time * budget.velocity_noise
+    stale = wrong + time * late * pushed
+    _check(alarms.ahead, tube.ahead + one * further + stale, "alarms.ahead")
+    straight = max(alarms.position + budget.position_noise, alarms.ahead + further)
+    return straight + stale + budget.acceleration_error * time * time / 2.0
 
 
 def check_axis_alarms(
@@ -107,12 +110,6 @@ def _check(stated: float, least: float, where: str) -> None:
 
 
 def _grows(budget: Budget, rate: float, acceleration: float) -> float:
-    """Return by how much a departure grows that moves no faster than noise hides, until reports know of it.
-
-    In the age of the measurements, in that of reports, each in whole periods, in one period more, and in what
-    clocks hide of the age.
-    """
-    T = budget.period
-    time = T * (1 + ceil(budget.delay / T - 1e-9) + ceil(budget.report_age / T - 1e-9))
-    time += 2.0 * budget.clock_error
+    """Return by how much a departure grows that moves no faster than noise hides, until that is known."""
+    time = unseen_in(budget)
     return rate * time + acceleration * time * time / 2.0

@@ -20,7 +20,7 @@ from coop_drake.verification.checks import Check
 ROUNDING = 1e-9
 """Differences that rounding explains, relative and absolute [m, s]."""
 
-_BOUNDS = ("radius", "rate", "velocity", "rest", "acceleration")
+_BOUNDS = ("radius", "rate", "velocity", "rest", "acceleration", "ahead")
 
 
 def check_position(plan: Plan, position_tolerance: float) -> list[Check]:

@@ -52,7 +52,7 @@ def oscillator(stiffness: float, damping: float, time: float) -> FloatArray:
 
 
 def position_bounds(tube: PositionTube, stiffness: float, damping: float, budget: Budget) -> FloatArray:
-    """Return the least radius, rate, velocity, rest and command that a tube must state, shape (5,).
+    """Return the least radius, rate, velocity, rest, command and what is ahead that a tube states, (6,).
 
     Args:
         tube: The tube.
@@ -73,17 +73,15 @@ def position_bounds(tube: PositionTube, stiffness: float, damping: float, budget
         raise RefusalError("tube", "the error of the model may exceed what the loop makes up for")
 
     def bounds(wrong: FloatArray, speed: float) -> FloatArray:
-        """Return |e| at samples, |e'|, |p'|, |u| and |p''|, shape (5, parts)."""
-        entering = wrong * sums[COMMAND, :3] + budget.acceleration_error * sums[KICK, :3]
-        asked = (
-            entering[2] + wrong + speed * sums[STEP, 5]
-        ) / gain  # p_G leads the command, feedback included
-        entering = entering + speed * sums[STEP, :3]
+        """Return |e| at samples, |e'|, |p'|, |u|, |p''| and |e + t e'|, shape (6, parts)."""
+        entering = wrong * sums[COMMAND] + budget.acceleration_error * sums[KICK]
+        asked = (entering[2] + wrong + speed * sums[STEP, 5]) / gain  # p_G leads it, feedback included
+        entering = entering + speed * sums[STEP]
         off, fast = entering[:2] + rest * asked * sums[KICK, :2]
         pushed = (1.0 + budget.model_error) * asked + budget.acceleration_error
         fast = fast + budget.period / 2.0 * (pushed + speed * sums[STEP, 3])
         quick = speed * sums[STEP, 4] + fast + budget.period / 2.0 * speed * sums[STEP, 3]
-        return np.array([off, fast, quick, asked, pushed])
+        return np.array([off, fast, quick, asked, pushed, entering[6] + rest * asked * sums[KICK, 6]])
 
     def settled(speed: float) -> FloatArray:
         """Return the bounds where measurements are of wrong instants, too, by which commands are wrong."""
@@ -102,12 +100,23 @@ def position_bounds(tube: PositionTube, stiffness: float, damping: float, budget
             raise RefusalError("budget.clock_error", "the loop does not make up for such an error of clocks")
         return bounds((noise + caused[0]) / (1.0 - caused[1]), speed)
 
-    off, fast, quick, asked, pushed = settled(tube.speed)
+    off, fast, quick, asked, pushed, ahead = settled(tube.speed)
     between = budget.period**2 / 8.0 * (pushed + nominal)
     single = asked + (budget.single_noise - 1.0) * noise  # of one robot, not of their mean
     single = (1.0 + errors + rest) * single  # by its masses, which are as wrong as in this part
     still = settled(0.0)[0] + between
-    return np.array([value.max() for value in (off + between, fast, quick, still, single)])
+    return np.array([value.max() for value in (off + between, fast, quick, still, single, ahead)])
+
+
+def unseen_in(budget: Budget) -> float:
+    """Return for how long nobody may know of a departure [s].
+
+    In the age of the measurements, in that of reports, each in whole periods, in one period more, and in what
+    clocks hide of the age.
+    """
+    T = budget.period
+    known = T * (1 + ceil(budget.delay / T - 1e-9) + ceil(budget.report_age / T - 1e-9))
+    return known + 2.0 * budget.clock_error
 
 
 def may_rest(tube: PositionTube, stiffness: float, damping: float, budget: Budget, rate: float) -> bool:
@@ -149,16 +158,17 @@ def _sums(
     budget: Budget,
     errors: FloatArray,
 ) -> FloatArray:
-    """Return the sums of absolute responses, shape (4 runs, 6, parts).
+    """Return the sums of absolute responses, shape (4 runs, 7, parts).
 
-    They are those of e, e', feedback, nominal acceleration, nominal velocity, and the command, which is the
-    sum of feedback and nominal acceleration.
+    They are those of e, e', feedback, nominal acceleration, nominal velocity, the command, which is the sum of
+    feedback and nominal acceleration, and e + t e'.
 
     The second run's are those to a unit of acceleration at all times, the fourth run's those to a unit of
     speed of p_G; the third run's are not used.
     """
-    T, sums = budget.period, np.zeros((4, 6, len(errors)))
+    T, sums, unseen = budget.period, np.zeros((4, 7, len(errors))), unseen_in(budget)
     for found in _followed(tube, flow, stiffness, damping, budget, errors):
+        found = np.concatenate([found, found[:, :1] + unseen * found[:, 1:2]], axis=1)
         sums[[COMMAND, STEP]] += np.abs(found[[COMMAND, STEP]])
         sums[KICK] += mean_size(found[KICK], found[KICK] + T * found[PLACE])
     sums[[KICK, STEP]] *= T
