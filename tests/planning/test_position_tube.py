@@ -16,7 +16,6 @@ from coop_drake.laws.nominal import nominal_flow
 from coop_drake.planning.budget.alarms import alarms_of, position_room, unseen_of
 from coop_drake.planning.budget.position_fit import UnprovedPosition, commanded_accelerations, fit_position
 from coop_drake.planning.budget.position_tube import PositionGains, position_tubes
-from coop_drake.planning.duration import plan_time
 from coop_drake.planning.transitions import with_gains
 from coop_drake.plant import planning_problem
 from tests.support.small_loop import small_problem
@@ -66,7 +65,7 @@ def test_random_disturbances_stay_in_the_tube_and_rest_nearer(name):
         run_position(flow, row, budget.period, delay, budget.lag, factor, disturbances, motion)
         assert np.abs(motion[:, 0] - motion[:, 2]).max() <= tube.radius
         assert np.abs(motion[:, 1] - motion[:, 3]).max() <= tube.rate
-        assert np.abs((motion @ [1.0, unseen_of(budget), -1.0, -unseen_of(budget)])).max() <= tube.ahead
+        assert np.abs(motion @ [1.0, unseen_of(budget), -1.0, -unseen_of(budget)]).max() <= tube.ahead
         assert np.abs(motion[-200:, 0] - motion[-200:, 2]).max() <= tube.rest + 1e-4
 
 
@@ -188,15 +187,13 @@ def test_slower_motion_is_chosen_where_accelerations_are_limited():
     problem, gains = planning_problem(scenario), ScheduledGains()
     accelerations = commanded_accelerations(problem, plan, gains, BUDGET)
     assert accelerations == sorted(set(accelerations), reverse=True)
-    times, speeds = [], []
-    for most in (accelerations[0], accelerations[-1], 15.0):
+    speeds = []
+    for most in (accelerations[0], 15.0, accelerations[-1]):
         found = fit_position(problem, plan, gains, BUDGET, most)
         assert isinstance(found, Plan)
         assert found.tube.acceleration <= most
         speeds.append(found.tube.speed)
-        times.append(plan_time(found))
-    assert times[0] < times[1] < times[2]
-    assert max(speeds[:2]) > speeds[2]
+    assert speeds[0] > speeds[1] > speeds[2]
 
 
 def test_a_cell_that_is_too_narrow_is_named():
