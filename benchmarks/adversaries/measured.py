@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from time import process_time
 
 import numpy as np
 
+from benchmarks.adversaries.claims import judged_claims
 from benchmarks.adversaries.questions import random_question
-from benchmarks.adversaries.sources import SOURCES, Ask
+from benchmarks.adversaries.sources import SOURCES
 from benchmarks.adversaries.trial import Judged, answered, judged_source, kind_of, refusal
 from benchmarks.isolated import WorkerError, in_own_process
 from benchmarks.rows import Row
@@ -24,6 +26,12 @@ SEEDS = {11: 172, 12: 172, 13: 171}
 
 SLICES = 500
 """Budget of slices of a random question, so that one which stays undecided takes seconds [-]."""
+
+TEAMS = ("warehouse", "base")
+"""Scenarios whose plans' claims are altered."""
+
+CLAIMED = 4
+"""How many times each kind of claim is altered."""
 
 LIMIT = 1200.0
 """CPU time that a source or a seed may take [s]."""
@@ -51,7 +59,11 @@ def adversary_tasks() -> list[Task]:
     tally: list[Judged] = []
     return [
         *(_random_task(seed, count) for seed, count in SEEDS.items()),
-        *(_source_task(name, ask, rounds, tally) for name, (ask, rounds) in SOURCES.items()),
+        *(
+            _source_task(name, partial(judged_source, ask, rounds), tally)
+            for name, (ask, rounds) in SOURCES.items()
+        ),
+        *(_source_task(f"claims/{team}", partial(judged_claims, team, CLAIMED), tally) for team in TEAMS),
         Task("adversaries/totals", lambda rows: _totals(tally), alone=True),
     ]
 
@@ -100,9 +112,9 @@ def _random_rows(seed: int, found: Sequence[Timed]) -> Iterator[Row]:
             yield Row(f"adversaries/refused random answers/{seed}, {k}/answer", 0.0, one.refusal)
 
 
-def _source_task(name: str, ask: Ask, rounds: int, tally: list[Judged]) -> Task:
+def _source_task(name: str, judge: Callable[[], list[Judged]], tally: list[Judged]) -> Task:
     def measure(rows: Rows) -> Rows:
-        found = in_own_process(judged_source, ask, rounds, limit=LIMIT).value
+        found = in_own_process(judge, limit=LIMIT).value
         if found is None:
             raise WorkerError(f"alterations of {name} took more than {LIMIT:.0f} s")
         tally.extend(found)

@@ -114,7 +114,7 @@ def _stated(gains: PositionGains, bounds: FloatArray) -> PositionTube:
 
 
 def _bounds(gains: PositionGains, budget: Budget, sums: FloatArray | None, error: float) -> FloatArray | None:
-    """Return radius, rate, velocity, rest, acceleration and what is ahead, (6,), from sums of responses (7, 3).
+    """Return radius, rate, velocity, rest, acceleration, what is ahead, (6,), from sums of responses (7, 3).
 
     Part of the error of the model is a disturbance of at most ``rest`` times the command itself, which the
     command's bound must allow for. A step of p_G moves the nominal acceleration and then the feedback, whose

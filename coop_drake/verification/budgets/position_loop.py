@@ -160,8 +160,8 @@ def _sums(
 ) -> FloatArray:
     """Return the sums of absolute responses, shape (4 runs, 7, parts).
 
-    They are those of e, e', feedback, nominal acceleration, nominal velocity, the command, which is the sum of
-    feedback and nominal acceleration, and e + t e'.
+    They are those of e, e', feedback, nominal acceleration, nominal velocity, the command, which is the sum
+    of feedback and nominal acceleration, and e + t e'.
 
     The second run's are those to a unit of acceleration at all times, the fourth run's those to a unit of
     speed of p_G; the third run's are not used.
