@@ -194,7 +194,7 @@ def test_a_section_that_is_set_may_vary_in_parts(tmp_path):
     section = {**ROOM, "count": 1, "set": {"deployment": {"preset": "mobile_base"}}, "grid": grid}
     variation = Variation(load_campaign(file_of(tmp_path, runs=section)))
     deployment = variation.scenario_of(variation.run(1)).deployment
-    assert (deployment.mass_error, deployment.actuators.base_force) == (0.1, 1000.0)
+    assert (deployment.mass_error, deployment.actuators.base_force) == (0.1, 650.0)
 
 
 @pytest.mark.parametrize(

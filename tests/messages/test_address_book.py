@@ -138,7 +138,7 @@ def test_team_files_fit_together_and_each_process_has_its_own_key(tmp_path):
 
 
 def test_the_command_writes_them_once(tmp_path):
-    said = invoke("keys", "--robots", 3, "--out", tmp_path / "keys", "--json", "--quiet")
+    said = invoke("apart", "keys", "--robots", 3, "--out", tmp_path / "keys", "--json", "--quiet")
     assert said.exit_code == 0
     assert len(json.loads(said.stdout)["files"]) == 6
     for wrong, words in (
@@ -147,7 +147,7 @@ def test_the_command_writes_them_once(tmp_path):
         (("--out", tmp_path / "other", "--port", 70000), "a port from 1 to 65535"),
         (("--out", tmp_path / "other", "--robots", 0), "--robots"),
     ):
-        refused = invoke("keys", *wrong)
+        refused = invoke("apart", "keys", *wrong)
         assert refused.exit_code == 2
         assert words in " ".join(refused.output.split())
     assert not (tmp_path / "other").exists()

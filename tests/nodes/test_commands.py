@@ -20,10 +20,7 @@ BASE = str(Path(__file__).parents[2] / "models" / "base.scenario.yaml")
         (["apart", "supervisor", BASE], "deployment.control_rate"),
         (["run", BASE, "--free-running"], "--free-running needs --apart"),
         (["run", BASE, "--faults", "faults.yaml"], "--faults needs --apart"),
-        (
-            ["simulate", BASE, "--blocks", "fused"],
-            "now nothing: every robot has blocks of its own",
-        ),
+        (["simulate", BASE, "--blocks", "fused"], "is gone: every robot has blocks of its own"),
         (["verify", "plan.json", BASE, "--braked"], "--braked is about the log of a run"),
     ],
 )

@@ -41,7 +41,7 @@ def test_the_budget_of_a_preset(tmp_path):
     assert budget_of("position", unlimited, problem) == replace(budget, axes=False, base_force=None, **alone)
     assert sum(body[1] for body in budget.bodies) == pytest.approx(17.0)
     moved = [sum(body[1] for body in budget.bodies if body[5] == k) for k in (0, 1)]
-    assert (budget.base_force, moved) == (1000.0, pytest.approx([8.5, 8.5]))
+    assert (budget.base_force, moved) == (650.0, pytest.approx([8.5, 8.5]))
     assert budget.bases == ((1.0, 0.35, 0.0), (2.0, -0.35, 0.0))
     assert (budget.delay, budget.lag, budget.model_error) == (0.01, 0.005, 0.2)
     assert budget.position_noise == pytest.approx(3.44 * 0.001 / sqrt(2.0))  # two robots of the same mass
