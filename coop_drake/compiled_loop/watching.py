@@ -271,13 +271,17 @@ def _watch_rotation(rate: float, before: FloatArray, figures: FloatArray) -> Non
 
 @compiled(borrows=True)
 def _watch_alarms(nominal: LoopNominal, memory: LoopMemory, figures: FloatArray) -> None:
-    """End the run where a robot asks for a hold: this loop does not know holds."""
+    """End the run where a robot asks for a hold, which this loop lacks; name the one that departs most."""
+    asked, most = False, 0
     for k in range(memory.alarms.shape[0]):
         if nominal.levels.size and not figures[ALARM] > memory.alarms[k, 1]:
             figures[ALARM] = memory.alarms[k, 1]
-        if memory.alarms[k, 0] > 0.0 and figures[ENDED] == RUNS:
-            figures[ROBOT] = k
-            end(figures, HELD, memory.alarms[k, 1], int(memory.alarms[k, 2]))
+        asked = asked or memory.alarms[k, 0] > 0.0
+        if memory.alarms[k, 1] > memory.alarms[most, 1]:
+            most = k
+    if asked and figures[ENDED] == RUNS:
+        figures[ROBOT] = most
+        end(figures, HELD, memory.alarms[most, 1], int(memory.alarms[most, 2]))
 
 
 @compiled(borrows=True)
