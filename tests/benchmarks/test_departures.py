@@ -2,18 +2,10 @@
 
 import pytest
 
-from benchmarks.departures import CASES, OBSERVED, PREDICTED, TEAMS, departure_tasks, deployment_of
-from benchmarks.deployed import DEPLOYMENTS, deployed_tasks
+from benchmarks.departures import CASES, OBSERVED, PREDICTED, deployment_of
 from coop_drake.scenario import Control, Deployment
 
 DATA = [data for case in CASES.values() for data in (case.mild, case.harsh) if data is not None]
-
-
-def test_there_are_tasks_for_every_team():
-    names = [task.name.split("/")[1] for task in departure_tasks()]
-    for team in TEAMS:
-        assert names.count(team) == len(CASES)
-        assert names.count(f"{team}_additions") == len(OBSERVED) + len(PREDICTED)
 
 
 def test_cases_are_deployments_each_of_its_own():
@@ -31,12 +23,3 @@ def test_every_departure_has_its_case(part):
 
 def test_an_addition_is_off_by_default():
     assert Control() == Control(predictor=False, observer=False)
-
-
-def test_every_row_under_the_preset_has_as_many_runs_as_seeds_and_mass_errors():
-    assert len(deployed_tasks()) == 15
-    for label, data in DEPLOYMENTS.items():
-        runs = [deployment_of(one) for one in data]
-        assert len({repr(run) for run in runs}) == len(data) == (1 if label == "ideal" else 15)
-    assert {deployment_of(one).measurements.delay for one in DEPLOYMENTS["preset_20_ms"]} == {0.02}
-    assert deployment_of(DEPLOYMENTS["ideal"][0]).ideal

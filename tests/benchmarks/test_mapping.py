@@ -4,8 +4,8 @@ import pytest
 from shapely import Point, Polygon, box
 
 from benchmarks.domains import Domain, hall_with_pillars, standard_domains, wavy_room
-from benchmarks.map_rows import RESIDUAL, ablation_rows, cost_rows, map_rows
-from benchmarks.mapping import PILLARS, VERTICES, mapping_tasks
+from benchmarks.map_rows import RESIDUAL, cost_rows, map_rows
+from benchmarks.mapping import PILLARS, VERTICES
 
 
 @pytest.mark.parametrize("domain", standard_domains().values(), ids=standard_domains())
@@ -37,15 +37,3 @@ def test_a_shape_that_is_refused_is_a_row_too():
     needle = Domain(Polygon([(0, 0), (3, 0), (0, 0.01)]), Point(0.1, 0.003))
     rows = cost_rows("mapping/growth/needle", needle)
     assert [(row.figure, row.unit) for row in rows] == [("answer", "refused"), ("vertices", "-")]
-
-
-def test_every_task_has_a_name_of_its_own_and_the_machine_to_itself():
-    tasks = mapping_tasks()
-    assert len({task.name for task in tasks}) == len(tasks) == 1 + len(standard_domains()) + 11
-    assert all(task.alone for task in tasks)
-
-
-def test_the_ablation_solves_a_map_with_and_without_compression():
-    (row,) = ablation_rows("mapping/ablation/square", standard_domains()["square"])
-    assert row.value > 0.0
-    assert row.peer_value > 0.0
