@@ -111,7 +111,7 @@ def scenario_command(
     machine: Machine = False,
     quiet: Quiet = False,
 ) -> None:
-    """Write a scenario and its models to start from; asks at a terminal for what no flag says.
+    """Write a scenario and its models to start from; at a terminal, ask for what no option says.
 
     `new NAME` means the same.
     """

@@ -93,8 +93,8 @@ BudgetName = Annotated[
     typer.Option(
         "--budget",
         metavar="all|position|FILE",
-        help="Departures from the ideal team that the plan shall tolerate: all of the scenario, "
-        "these for the object's position alone, or those of a file.",
+        help="What the plan must tolerate: `all` of the scenario's `deployment`, `position` for the object's "
+        "position alone, or a file with a budget.",
     ),
 ]
 Effort = Annotated[
@@ -104,8 +104,8 @@ Effort = Annotated[
         metavar="SHARE",
         min=0.0,
         max=1000.0,
-        help="Work for a quicker transport as a share of the default: 0 takes the path found first, 2 spends "
-        "twice as much; the scenario's `planner: {effort}` by default.",
+        help="How much work to spend on a quicker transport: 0 takes the first path that is found, 2 doubles "
+        "the work. By default the scenario's `planner: {effort}`.",
     ),
 ]
 ResultsFolder = Annotated[Path | None, out_folder("Where results go; out/<scenario> by default.")]
@@ -131,7 +131,7 @@ Wait = Annotated[
     bool,
     typer.Option(
         "--wait",
-        help="Show the run as --live does, and begin only when a browser shows the page.",
+        help="Like --live, but begin only when a browser shows the page.",
     ),
 ]
 NoFigures = Annotated[bool, typer.Option("--no-figures", help="Write the recording, but no figures.")]
@@ -147,7 +147,7 @@ FreeRunning = Annotated[
     bool,
     typer.Option(
         "--free-running",
-        help="Pace the processes by the wall clock: what comes too late is not waited for; measures ages.",
+        help="Run at the pace of the wall clock, do not wait for late efforts, and print how old they were.",
     ),
 ]
 FaultsFile = Annotated[
@@ -155,7 +155,7 @@ FaultsFile = Annotated[
     typer.Option(
         "--faults",
         metavar="FILE",
-        help="What goes wrong between processes apart: messages lost, late or repeated, clocks apart (YAML).",
+        help="YAML file of faults between processes: lost, late or repeated messages, and wrong clocks.",
     ),
 ]
 Restarts = Annotated[
@@ -164,7 +164,7 @@ Restarts = Annotated[
         "--restarts",
         metavar="N",
         min=0,
-        help="With --apart: how often each process that ends too early is started again.",
+        help="With --apart: how often a process that ends too early is started again.",
     ),
 ]
 Rejoin = Annotated[
@@ -173,6 +173,6 @@ Rejoin = Annotated[
         "--rejoin",
         metavar="SECONDS",
         min=0.0,
-        help="How long a team of processes rests and waits for one without answers before the run ends.",
+        help="How long the team waits at rest for a process that does not answer, before the run ends.",
     ),
 ]

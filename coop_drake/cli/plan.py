@@ -43,7 +43,7 @@ def plan_command(
     quiet: Quiet = False,
     verbose: Verbose = False,
 ) -> None:
-    """Plan only: write the plan, a way that limits refuse, or the proof that there is none."""
+    """Plan only: write a plan, a way that breaks a limit, or a proof that there is none."""
     with reporting(machine=machine, quiet=quiet, verbose=verbose) as reporter:
         task = read_task(scenario, gains, reporter)
         folder = ResultFolder.of(task.name, out, "plan")

@@ -35,7 +35,9 @@ def robot_command(
     ] = None,
     fix: Annotated[
         list[str] | None,
-        typer.Option("--fix", metavar="JOINT=VALUE", help="Show the others' axes with this joint there."),
+        typer.Option(
+            "--fix", metavar="JOINT=VALUE", help="Show the axes of the other joints with this joint at VALUE."
+        ),
     ] = None,
     gripper: Annotated[
         str | None,

@@ -41,14 +41,14 @@ def verify_command(
         bool,
         typer.Option(
             "--braked",
-            help="Check motion, mechanics, limits and clearances of a run in which all drives braked, and "
-            "not that the team followed the plan.",
+            help="For the log of a run in which all drives braked: check everything except that the team "
+            "followed the plan.",
         ),
     ] = False,
     question: Annotated[
         Path | None,
         typer.Option(
-            help="Write here what the scenario asks, for `python -m coop_drake.checking QUESTION FILE`."
+            help="Write the scenario's question here, for `python -m coop_drake.checking QUESTION FILE`."
         ),
     ] = None,
     machine: Machine = False,

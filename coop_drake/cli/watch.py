@@ -50,12 +50,15 @@ def watch_command(
             metavar="N",
             min=_FEWEST,
             max=_MOST,
-            help="Largest number of keyframes; 36 by default.",
+            help="Largest number of keyframes.",
         ),
     ] = 36,
     strategy: Annotated[
         Literal["cells", "paper", "portfolio"],
-        typer.Option("--strategy", help="Exploration by cells, as the paper prints it, or all of planning."),
+        typer.Option(
+            "--strategy",
+            help="Exploration by cells, the paper's exploration, or (portfolio) the whole search of `plan`.",
+        ),
     ] = "cells",
     margin: Annotated[
         float | None,
@@ -64,7 +67,7 @@ def watch_command(
             metavar="M",
             min=0.0,
             callback=_checked_margin,
-            help="Metres to keep from the walls; cells: 0 by default, else 'no path' is no proof.",
+            help="Distance to keep from walls [m]. Only with 0, the default of cells, is 'no path' a proof.",
         ),
     ] = None,
     machine: Machine = False,
