@@ -2,43 +2,42 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Iterator
 
 from coop_drake.campaign.settings import Campaign
-from docs.generate.scenario_keys import Section, sections
+from docs.generate.scenario_keys import ScenarioKey, Section, sections
 
 __all__ = ["campaign_page", "scenario_page"]
 
 _TOP = """# Scenario files
 
-A scenario is one YAML file that ends in `.scenario.yaml`. Every key is listed here with its unit, its default
-and what may stand there; a key that is not listed is refused, with those that are. Lengths are metres,
-angles radians, frames those of the [conventions](../conventions.md).
-[How to write one](../how_to/own_scenario.md) shows a small one.
-
-`make docs` makes this page from the classes that hold the values; loading checks the same limits.
+A scenario is one YAML file that ends in `.scenario.yaml`. [How to write one](../how_to/own_scenario.md) shows
+a small one. In brackets stand the unit, what a key may be, and its default. Any other key is refused. Lengths
+are metres, angles radians, frames those of the [conventions](../conventions.md). `make docs` makes this page
+from the classes that hold the values.
 """
-
 
 _CAMPAIGN = """# Campaign files
 
-A campaign is one YAML file that ends in `.campaign.yaml`; [how to run one](../how_to/campaign.md). A key that
-is not listed is refused. `make docs` makes this page from the classes that hold the values.
+A campaign is one YAML file that ends in `.campaign.yaml`; [how to run one](../how_to/campaign.md). In
+brackets stand the unit, what a key may be, and its default. `make docs` makes this page from the classes that
+hold the values.
 """
 
 
 def scenario_page() -> str:
-    """Return the page of scenario files: one table for each section."""
-    return "\n".join([_TOP, *_tables(sections())])
+    """Return the page of scenario files: one list for each section."""
+    return "\n".join([_TOP, *_lists(sections())])
 
 
 def campaign_page() -> str:
     """Return the page of campaign files, likewise."""
-    return "\n".join([_CAMPAIGN, *_tables(sections(Campaign))])
+    return "\n".join([_CAMPAIGN, *_lists(sections(Campaign))])
 
 
-def _tables(found: Iterable[Section]) -> Iterator[str]:
-    """Yield the table of every section; sections with the same keys have one, where the first stands."""
+def _lists(found: Iterable[Section]) -> Iterator[str]:
+    """Yield the list of every section; sections with the same keys have one, where the first stands."""
     places: dict[tuple[object, ...], list[Section]] = {}
     for section in found:
         places.setdefault((section.about, section.keys), []).append(section)
@@ -48,20 +47,39 @@ def _tables(found: Iterable[Section]) -> Iterator[str]:
 
 def _section(section: Section, others: list[str]) -> str:
     also = f"The same keys stand in {', '.join(f'`{path}`' for path in others)}."
-    lines = [
-        f"## `{section.path}`" if section.path else "## The file",
-        "",
-        section.about,
-        *(["", also] if others else []),
-        "",
-        "| key | value | default | meaning |",
-        "|---|---|---|---|",
-    ]
-    for key in section.keys:
-        kind = f"{key.kind} [{key.unit}]" if key.unit else key.kind
-        default = (
-            f"`{key.default}`" if key.default not in ("", "see below") else key.default or "**required**"
-        )
-        cells = (f"`{key.name}`", kind, default, key.meaning)
-        lines.append("| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |")
-    return "\n".join([*lines, ""])
+    heading = f"## `{section.path}`" if section.path else "## The file"
+    return "\n".join(
+        [heading, "", section.about, *(["", also] if others else []), "", *map(_entry, section.keys), ""]
+    )
+
+
+def _entry(key: ScenarioKey) -> str:
+    """Return the line of one key: its name; in brackets unit, type and limits, default; its meaning."""
+    facts = [key.unit.removeprefix("-"), _short(key.kind), f"`{key.default}`" if key.default else "required"]
+    if key.default == "see below":
+        facts = ["section"]
+    return f"- `{key.name}` ({'; '.join(fact for fact in facts if fact)}): {key.meaning}"
+
+
+_SHORTER = (
+    (r"a mapping from names to ", "by name: "),
+    (r"a list, each entry ", "list of "),
+    (r"zero or a positive (whole number|number)", r"\1 ≥ 0"),
+    (r"a positive (whole number|number)", r"\1 > 0"),
+    (r"a (whole number|number) of at least ", r"\1 ≥ "),
+    (r"a (whole number|number) between (\S+) and (\S+)", r"\1 from \2 to \3"),
+    (r", less than ", " and < "),
+    (r", at most ", " and ≤ "),
+    (r"\ba (text|section|whole number|number)", r"\1"),
+    (r"whole number", "integer"),
+    (r"number ([≥>])", r"\1"),
+    (r"\bnumber from ", ""),
+)
+"""How types and limits in words are said on the pages, in a few characters."""
+
+
+def _short(kind: str) -> str:
+    """Return the type and limits of a key in a few characters."""
+    for words, shorter in _SHORTER:
+        kind = re.sub(words, shorter, kind)
+    return "" if kind == "true or false" else kind
