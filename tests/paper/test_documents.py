@@ -45,8 +45,3 @@ def test_every_equation_of_the_paper_has_a_row():
 def test_functions_named_beside_equations_exist(path, name):
     source = (ROOT / "coop_drake" / path).read_text(encoding="utf-8")
     assert re.search(rf"^(def|class) {name}\b", source, re.MULTILINE)
-
-
-@pytest.mark.parametrize("place", sorted(set(re.findall(r"`(\w+/test_\w+\.py)`", EQUATIONS))))
-def test_tests_named_beside_equations_exist(place):
-    assert (ROOT / "tests" / place).is_file()
