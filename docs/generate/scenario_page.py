@@ -13,9 +13,10 @@ __all__ = ["campaign_page", "scenario_page"]
 _TOP = """# Scenario files
 
 A scenario is one YAML file that ends in `.scenario.yaml`. [How to write one](../how_to/own_scenario.md) shows
-a small one. In brackets stand the unit, what a key may be, and its default. Any other key is refused. Lengths
-are metres, angles radians, frames those of the [conventions](../conventions.md). `make docs` makes this page
-from the classes that hold the values.
+a small one. Every section has a heading here; `workspace`, `directives`, `start` and `goal` are required. In
+brackets stand the unit, what a key may be, and its default. Any other key is refused. Lengths are metres,
+angles radians, frames those of the [conventions](../conventions.md). `make docs` makes this page from the
+classes that hold the values.
 """
 
 _CAMPAIGN = """# Campaign files
@@ -37,20 +38,30 @@ def campaign_page() -> str:
 
 
 def _lists(found: Iterable[Section]) -> Iterator[str]:
-    """Yield the list of every section; sections with the same keys have one, where the first stands."""
-    places: dict[tuple[object, ...], list[Section]] = {}
+    """Yield the list of every section; sections with the same keys have one, where the first stands.
+
+    A key whose section has a list of its own is not listed above it, too.
+    """
+    places: dict[tuple[str, tuple[ScenarioKey, ...]], list[str]] = {}
     for section in found:
-        places.setdefault((section.about, section.keys), []).append(section)
-    for same in places.values():
-        yield _section(same[0], [one.path for one in same[1:]])
-
-
-def _section(section: Section, others: list[str]) -> str:
-    also = f"The same keys stand in {', '.join(f'`{path}`' for path in others)}."
-    heading = f"## `{section.path}`" if section.path else "## The file"
-    return "\n".join(
-        [heading, "", section.about, *(["", also] if others else []), "", *map(_entry, section.keys), ""]
-    )
+        places.setdefault((section.about, section.keys), []).append(section.path)
+    alone = {same[0] for same in places.values() if len(same) == 1}
+    for (about, keys), same in places.items():
+        inside = f"{same[0]}." if same[0] else ""
+        yield "\n".join(
+            [
+                f"## `{same[0]}`" if same[0] else "## The file",
+                "",
+                about,
+                *(
+                    ["", f"The same keys stand in {', '.join(f'`{path}`' for path in same[1:])}."]
+                    * (len(same) > 1)
+                ),
+                "",
+                *(_entry(key) for key in keys if f"{inside}{key.name}" not in alone),
+                "",
+            ]
+        )
 
 
 def _entry(key: ScenarioKey) -> str:
