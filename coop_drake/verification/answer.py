@@ -1,10 +1,19 @@
-"""Verify a plan or a proof: geometry by the exact checker, the match of question and gains by comparison."""
+"""Verify an answer: geometry by the exact checker, match of files and question, gains, limits and budget."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
+from math import remainder, tau
+from pathlib import Path
 from typing import Any
 
+import numpy as np
+
+from coop_drake.answers import plan_file, proof_file
+from coop_drake.answers.belonging import same_goal_joints
+from coop_drake.answers.digest import content_digest, problem_digest
+from coop_drake.answers.document import Document
 from coop_drake.answers.plan import Plan
 from coop_drake.answers.plan_file import plan_document
 from coop_drake.answers.problem import PlanningProblem
@@ -23,11 +32,53 @@ from coop_drake.verification.budgets import (
     check_restart,
 )
 from coop_drake.verification.checks import Check, Verified
-from coop_drake.verification.gains import check_gains
-from coop_drake.verification.problem_match import check_problem
+from coop_drake.verification.gains import check_accelerations, check_gains, check_limits, check_speeds
 from coop_drake.verification.question import question_of
-from coop_drake.verification.refusals import check_limits
-from coop_drake.verification.speeds import check_accelerations, check_speeds
+
+SAME_ANGLE = 1e-9
+"""Two angles that differ by this, whole turns aside, are one angle that was rounded [rad]."""
+
+
+def same_angle(first: float, second: float) -> bool:
+    """Whether two angles are the same up to whole turns and rounding [rad]."""
+    return abs(remainder(float(first - second), tau)) <= SAME_ANGLE
+
+
+def check_digest(digest: str, problem: PlanningProblem) -> None:
+    """Refuse a document that was written for another floor, team, start or goal.
+
+    Raises:
+        RefusalError: Names both digests.
+    """
+    expected = problem_digest(problem)
+    if digest != expected:
+        raise RefusalError("problem", f"{digest!r} is not the scenario's digest, '{expected}'")
+
+
+def check_problem(plan: Plan, problem: PlanningProblem) -> Check:
+    """Compare a plan's own statement of its problem with the problem.
+
+    Raises:
+        RefusalError: Names the entry and both values.
+    """
+    goal, stated = problem.goal_pose, plan.goal_pose
+    names = [joint.name for joint in problem.tree.joints]
+    same_goal = np.array_equal(stated[:2], goal[:2]) and same_angle(stated[2], goal[2])
+    for where, same, found, expected in (
+        ("joint_names", list(plan.joint_names) == names, list(plan.joint_names), names),
+        ("start", np.array_equal(plan.start, problem.start), plan.start.tolist(), problem.start.tolist()),
+        (
+            "goal_joints",
+            same_goal_joints(plan, problem),
+            list(plan.goal_joints),
+            list(problem.goal_joints),
+        ),
+        ("goal_pose", same_goal, stated.tolist(), goal.tolist()),
+    ):
+        if not same:
+            raise RefusalError(where, f"{found} is not the scenario's, {expected}")
+    check_digest(plan.problem, problem)
+    return Check("the problem is the scenario's: floor, team, start, goal, tolerances", 1)
 
 
 def verify_plan(
@@ -170,3 +221,48 @@ def _exactly(
     except RefusedError as refusal:
         where, _, finding = str(refusal).partition(": ")
         raise RefusalError(where, finding) from refusal
+
+
+def verify_file(
+    path: Path | str,
+    problem: PlanningProblem,
+    gain_sets: Mapping[str, GainSet],
+    progress: Progress | None = None,
+    *,
+    budgets: ScenarioBudgets | None = None,
+) -> Verified:
+    """Verify a file that ``save_plan`` or ``save_proof`` wrote.
+
+    Args:
+        path: The file.
+        problem: The problem that it should solve or refute.
+        gain_sets: The scenario's gain sets by name.
+        progress: Called with a phase and the fraction of it that is done.
+        budgets: As ``verify_plan`` takes it.
+
+    Returns:
+        What was checked.
+
+    Raises:
+        PlanError: The file is neither a plan nor a proof: names the file, the key and what is allowed.
+        RefusalError: It is one, but a statement in it does not hold: names the place.
+    """
+    document = Document.load(path, "a plan or a proof of infeasibility")
+    form = document.check_entry("format", plan_file.FORMAT, proof_file.FORMAT)
+    if form == plan_file.FORMAT:
+        plan = plan_file.read_plan(document)
+        unaltered = _check_unaltered(document)
+        verified = verify_plan(plan, problem, gain_sets, progress, budgets=budgets)
+    else:
+        saved = proof_file.read_proof(document)
+        unaltered = _check_unaltered(document)
+        check_digest(saved.problem, problem)
+        verified = verify_proof(saved.proof, problem, progress)
+    return replace(verified, checks=(unaltered, *verified.checks))
+
+
+def _check_unaltered(document: Document) -> Check:
+    found, expected = document.content["digest"], content_digest(document.content)
+    if found != expected:
+        raise RefusalError("digest", f"{found!r} is not that of the content, '{expected}': it was altered")
+    return Check("the file is as it was written, for this scenario", 1)

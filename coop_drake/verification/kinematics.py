@@ -1,10 +1,14 @@
-"""The convex solids of a team, each with the joints that move it, from its own joint to the object."""
+"""The team's convex solids and the joints that move them, and kinematics of the verifier's own.
+
+A stage is one joint that moves a solid; the stages of a component begin with its own joint and end with theta
+of the object. Configurations z = (x, y, theta, q...) of a log have shape (T, 3 + n) [m, rad].
+"""
 
 from __future__ import annotations
 
 from collections.abc import Collection
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -97,3 +101,117 @@ _THETA = Stage(0, "revolute", 1.0, np.zeros(2), PlanarPose())
 def _stage(joint: TreeJoint) -> Stage:
     scale = joint.sign if joint.kind == "revolute" else 1.0
     return Stage(1 + joint.index, joint.kind, scale, np.array(joint.axis), joint.X_PJ)
+
+
+def cross(first: FloatArray, second: FloatArray) -> FloatArray:
+    """The component out of the plane of the product of vectors (T, 2), shape (T,)."""
+    return first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]
+
+
+def left(vectors: FloatArray) -> FloatArray:
+    """Vectors (T, 2) turned by a right angle, counter-clockwise."""
+    return np.column_stack((-vectors[:, 1], vectors[:, 0]))
+
+
+def turned(vectors: FloatArray, angles: FloatArray) -> FloatArray:
+    """Vectors (T, 2) turned by angles (T,)."""
+    c, s = np.cos(angles), np.sin(angles)
+    return np.column_stack((c * vectors[:, 0] - s * vectors[:, 1], s * vectors[:, 0] + c * vectors[:, 1]))
+
+
+def points_in_world(points: FloatArray, stages: tuple[Stage, ...], z: FloatArray) -> FloatArray:
+    """Carry points of one component to W by its stages.
+
+    Args:
+        points: Points in the component's frame, shape (m, 2) [m].
+        stages: What moves the component: its own joint first, theta last.
+        z: Configurations (x, y, theta, q...), shape (T, 3 + n) [m, rad].
+
+    Returns:
+        Shape (T, m, 2) [m].
+    """
+    carried = np.broadcast_to(points, (len(z), *points.shape))
+    for stage in stages:
+        values = stage.scale * z[:, 2 + stage.axis]
+        if stage.kind == "prismatic":
+            carried = carried + values[:, None, None] * stage.direction
+        else:
+            c, s = np.cos(values)[:, None], np.sin(values)[:, None]
+            x, y = carried[..., 0], carried[..., 1]
+            carried = np.stack((c * x - s * y, s * x + c * y), axis=-1)
+        carried = stage.X_PJ.apply(carried)
+    placed: FloatArray = carried + z[:, None, :2]
+    return placed
+
+
+def turns(stages: tuple[Stage, ...], z: FloatArray) -> FloatArray:
+    """Angles of one component in W, not wrapped, shape (T,) [rad]; arguments as above."""
+    angles = np.zeros(len(z))
+    for stage in stages:
+        angles += stage.X_PJ.angle
+        if stage.kind == "revolute":
+            angles += stage.scale * z[:, 2 + stage.axis]
+    return angles
+
+
+def levers(reach: float, stages: tuple[Stage, ...], z: FloatArray) -> FloatArray:
+    """Bound how far a point of a component moves for each unit of every stage, at all configurations.
+
+    Args:
+        reach: Largest distance of the component's points from its frame's origin [m].
+        stages: The stages that count: its own joint first.
+        z: Configurations of the log, which bound how far joints slide, shape (T, 3 + n) [m, rad].
+
+    Returns:
+        One bound for each stage, shape (stages,) [m for each rad, or m for each m].
+    """
+    bounds = []
+    for stage in stages:
+        if stage.kind == "prismatic":
+            slide = float(np.hypot(*stage.direction))
+            bounds.append(slide)
+            reach += slide * float(np.abs(z[:, 2 + stage.axis]).max())
+        else:
+            bounds.append(reach)
+        reach += float(np.hypot(stage.X_PJ.x, stage.X_PJ.y))
+    return np.array(bounds)
+
+
+class Motion(NamedTuple):
+    """How a point of a component moves in W.
+
+    Attributes:
+        place: Its position from the object's origin, shape (T, 2) [m].
+        velocity: Shape (T, 2) [m/s].
+        acceleration: Shape (T, 2) [m/s^2].
+        rate: Rate of the component's angle, shape (T,) [rad/s].
+        turning: Its second derivative, shape (T,) [rad/s^2].
+    """
+
+    place: FloatArray
+    velocity: FloatArray
+    acceleration: FloatArray
+    rate: FloatArray
+    turning: FloatArray
+
+
+def moved(
+    point: FloatArray, stages: tuple[Stage, ...], z: FloatArray, rates: FloatArray, accelerations: FloatArray
+) -> Motion:
+    """Carry a point of a component, shape (2,) [m], with its derivatives through its stages."""
+    count = len(z)
+    x, v, a = np.tile(point, (count, 1)), np.zeros((count, 2)), np.zeros((count, 2))
+    spin, turning = np.zeros(count), np.zeros(count)
+    for stage in stages:
+        q, rate, second = (stage.scale * values[:, 2 + stage.axis] for values in (z, rates, accelerations))
+        if stage.kind == "prismatic":
+            x, v, a = (old + new[:, None] * stage.direction for old, new in ((x, q), (v, rate), (a, second)))
+        else:
+            x, v, a = (turned(old, q) for old in (x, v, a))
+            w = rate[:, None]
+            a = a + 2.0 * w * left(v) + second[:, None] * left(x) - w * w * x
+            v, spin, turning = v + w * left(x), spin + rate, turning + second
+        angle = np.full(count, stage.X_PJ.angle)
+        x, v, a = (turned(old, angle) for old in (x, v, a))
+        x = x + np.array([stage.X_PJ.x, stage.X_PJ.y])
+    return Motion(x, v + rates[:, :2], a + accelerations[:, :2], spin, turning)

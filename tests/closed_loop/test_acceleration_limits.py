@@ -19,11 +19,10 @@ from coop_drake.plant import planning_problem, run_setup
 from coop_drake.scenario.limits import RobotLimits
 from coop_drake.simulation import build_maps, simulate
 from coop_drake.verification import verify_file
-from coop_drake.verification.refusals import check_limits
+from coop_drake.verification.gains import check_accelerations, check_limits
 from coop_drake.verification.runs import verify_log
+from coop_drake.verification.runs.mechanics import check_run_efforts
 from coop_drake.verification.runs.rows import Rows
-from coop_drake.verification.runs.speeds import check_run_efforts
-from coop_drake.verification.speeds import check_accelerations
 from tests.support.certificates import changed, write
 from tests.support.small_scenario import small_scenario
 

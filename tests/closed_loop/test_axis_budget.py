@@ -16,10 +16,9 @@ from coop_drake.scenario import ActuatorLimits, Deployment, Measurements, Messag
 from coop_drake.simulation import build_maps, simulate
 from coop_drake.verification.budgets import check_budget
 from coop_drake.verification.runs import verify_log
-from coop_drake.verification.runs.handovers import check_handovers
-from coop_drake.verification.runs.readiness import rest_shares
+from coop_drake.verification.runs.budget import check_budget_used
+from coop_drake.verification.runs.laws import check_handovers, rest_shares
 from coop_drake.verification.runs.rows import Rows
-from coop_drake.verification.runs.tube import check_budget_used
 from tests.support.run_checks import verified_run
 from tests.support.small_scenario import small_scenario
 

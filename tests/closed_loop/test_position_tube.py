@@ -11,8 +11,8 @@ from coop_drake.errors import RefusalError, ScenarioError
 from coop_drake.scenario import ActuatorLimits, Deployment, Hold, Measurements, Messages
 from coop_drake.scenario.control import Control
 from coop_drake.simulation import build_maps, simulate
+from coop_drake.verification.runs.budget import check_budget_used
 from coop_drake.verification.runs.rows import Rows
-from coop_drake.verification.runs.tube import check_budget_used
 from tests.support.run_checks import verified_run
 from tests.support.sampled_block import simulate_sampled
 from tests.support.tubes import BUDGET, tubed_problem

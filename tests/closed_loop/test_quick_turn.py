@@ -15,8 +15,8 @@ from coop_drake.scenario import Deployment, Goal, ObjectPose, Start
 from coop_drake.simulation import build_maps, simulate
 from coop_drake.typed_data import convert_class
 from coop_drake.verification.budgets import check_budget
+from coop_drake.verification.runs.budget import check_budget_used
 from coop_drake.verification.runs.rows import Rows
-from coop_drake.verification.runs.tube import check_budget_used
 from tests.support.small_scenario import small_scenario
 
 ARMS = (-0.05, 0.22), (0.45, -0.95)

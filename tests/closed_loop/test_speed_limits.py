@@ -15,8 +15,8 @@ from coop_drake.scenario import Deployment, Measurements
 from coop_drake.scenario.limits import RobotLimits
 from coop_drake.simulation import build_maps, simulate
 from coop_drake.verification import verify_file
+from coop_drake.verification.gains import check_speeds
 from coop_drake.verification.runs import verify_log
-from coop_drake.verification.speeds import check_speeds
 from tests.support.certificates import changed, write
 from tests.support.run_checks import verified_run
 from tests.support.small_scenario import small_scenario

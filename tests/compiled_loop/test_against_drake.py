@@ -34,7 +34,7 @@ from coop_drake.scenario import (
 from coop_drake.simulation import build_maps, simulate
 from coop_drake.tuning.objective import outcome_of
 from coop_drake.verification.runs import Rows, budget_share
-from coop_drake.verification.runs.ends import check_start
+from coop_drake.verification.runs.verify_log import check_start
 from tests.support.small_loop import small_maps, small_problem
 from tests.support.tubes import WITH_AXES, tubed_problem
 

@@ -26,7 +26,8 @@ from coop_drake.plant.budgets import budget_of, scenario_budgets
 from coop_drake.scenario import Deployment, load_scenario
 from coop_drake.scenario.limits import RobotLimits
 from coop_drake.typed_data import convert_class, field_types
-from coop_drake.verification import exact, verify_plan
+from coop_drake.verification import answer as exact
+from coop_drake.verification import verify_plan
 from coop_drake.verification.budgets import check as axes
 from coop_drake.verification.budgets import check_origin, position
 from coop_drake.verification.gains import check_ages
@@ -133,7 +134,7 @@ FREE = {
 
 ADVICE = (
     "nothing refuses it. Let `verify` derive the number and compare it (coop_drake/verification: gains.py, "
-    "speeds.py, budgets/), or, if it is a free choice, check its inequality there and add it to FREE with "
+    "budgets/), or, if it is a free choice, check its inequality there and add it to FREE with "
     "factors that break the inequality"
 )
 

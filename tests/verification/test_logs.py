@@ -10,7 +10,7 @@ from coop_drake.plant import planning_problem, run_setup
 from coop_drake.scenario import ActuatorLimits, Deployment, Measurements, Messages
 from coop_drake.simulation import build_maps, simulate
 from coop_drake.verification.runs import Rows, verify_log
-from coop_drake.verification.runs.nominal_reports import check_nominal_reports
+from coop_drake.verification.runs.budget import check_nominal_reports
 from tests.support.run_oracle import RunOracle
 from tests.support.small_loop import small_maps, small_problem
 from tests.support.tubes import WITH_AXES, tubed_problem

@@ -22,8 +22,7 @@ from coop_drake.answers.budget import Budget
 from coop_drake.answers.plan import Cell
 from coop_drake.tree import ComponentTree
 from coop_drake.tree.pose import FloatArray, IntArray
-from coop_drake.verification.runs.placement import points_in_world
-from coop_drake.verification.solids import Stage, component_stages
+from coop_drake.verification.kinematics import Stage, component_stages, points_in_world
 
 IMAGINARY, STEP = 1e-30, 1e-5
 """Imaginary step, and step of the difference of first derivatives [rad or m]."""

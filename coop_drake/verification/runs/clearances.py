@@ -20,10 +20,15 @@ from coop_drake.answers.problem import PlanningProblem
 from coop_drake.progress import Progress
 from coop_drake.tree.pose import FloatArray
 from coop_drake.verification.checks import Check
-from coop_drake.verification.runs.between import Between
-from coop_drake.verification.runs.placement import levers, points_in_world
-from coop_drake.verification.runs.rows import Rows
-from coop_drake.verification.solids import Solid, Stage, checked_pairs, team_solids
+from coop_drake.verification.kinematics import (
+    Solid,
+    Stage,
+    checked_pairs,
+    levers,
+    points_in_world,
+    team_solids,
+)
+from coop_drake.verification.runs.rows import Between, Rows
 
 PARTS = (2, 4, 8, 16, 32, 64)
 """Into how many parts the chord between two rows is divided, tried in this order."""

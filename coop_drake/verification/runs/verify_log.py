@@ -3,21 +3,18 @@
 Each function raises a RefusalError at the first entry for which a statement does not hold, with the name of
 the array, the index and the time:
 
-1. It belongs to the plan and the scenario: ``check_belonging`` below.
-2. Every number is finite, time passes, cells follow one another: ``rows.check_complete``.
-3. It begins at the plan's start and ends at the goal: ``ends``.
-4. Rates are the derivatives of positions: ``between.check_motion``.
-5. Every state lay in its cell and in its funnel: ``cells.check_cells``, ``funnels.check_funnels``.
-6. Robots report what their states say, and cells were entered one by one when all were ready: ``readiness``,
-   ``handovers``.
-7. Bases, wrenches and efforts go with the motion: ``grasps``, ``mechanics``.
-8. Bases and joints kept their limits: ``speeds.check_run_speeds``, ``speeds.check_run_efforts``.
-9. Nothing touched: ``clearances.check_clearances``.
-10. Nothing departed by more than a budget of the plan states: ``tube.check_budget_used``. Delta E and reports
-    are those of its nominal motions: ``nominal_reports``.
+1. It belongs to the plan and the scenario, begins at the plan's start and ends at the goal: below.
+2. Every number is finite, time passes, cells follow one another; rates are the derivatives of positions:
+   ``rows``.
+3. Every state lay in its cell and in its funnel; robots report what their states say, and cells were entered
+   one by one when all were ready: ``laws``.
+4. Bases, wrenches and efforts go with the motion, bases and joints kept their limits: ``mechanics``.
+5. Nothing touched: ``clearances``.
+6. Nothing departed by more than a budget of the plan states. Delta E and reports are those of its nominal
+   motions: ``budget``.
 
-Of a run in which all drives braked, statements 5, 6 and 10 are left aside: they are about the plan's laws.
-Arrays that no check computes again, or ties to others, are named in the answer.
+Of a run in which all drives braked, statements 3 and 6 are left aside: they are about the plan's laws. Arrays
+that no check computes again, or ties to others, are named in the answer.
 """
 
 from __future__ import annotations
@@ -33,22 +30,88 @@ from coop_drake.answers.plan_file import plan_digest
 from coop_drake.answers.problem import PlanningProblem
 from coop_drake.errors import RefusalError
 from coop_drake.progress import Progress
+from coop_drake.tree.pose import FloatArray
 from coop_drake.verification.checks import Check, Verified
-from coop_drake.verification.runs.between import Between, check_motion
-from coop_drake.verification.runs.cells import check_cells
+from coop_drake.verification.runs.budget import check_budget_used, check_nominal_reports
 from coop_drake.verification.runs.clearances import check_clearances
-from coop_drake.verification.runs.ends import check_arrival, check_start
-from coop_drake.verification.runs.funnels import check_funnels, check_stated_funnels
-from coop_drake.verification.runs.grasps import check_grasps, check_wrenches
-from coop_drake.verification.runs.handovers import check_handovers
-from coop_drake.verification.runs.holds import check_clock
-from coop_drake.verification.runs.mechanics import check_mechanics
-from coop_drake.verification.runs.nominal_reports import check_nominal_reports
-from coop_drake.verification.runs.readiness import check_energy_margin, check_reference, check_reports
-from coop_drake.verification.runs.rows import Rows, check_complete
-from coop_drake.verification.runs.setup import RunSetup
-from coop_drake.verification.runs.speeds import check_run_efforts, check_run_speeds
-from coop_drake.verification.runs.tube import check_budget_used
+from coop_drake.verification.runs.laws import (
+    check_cells,
+    check_clock,
+    check_energy_margin,
+    check_funnels,
+    check_handovers,
+    check_reference,
+    check_reports,
+    check_stated_funnels,
+)
+from coop_drake.verification.runs.mechanics import (
+    check_grasps,
+    check_mechanics,
+    check_run_efforts,
+    check_run_speeds,
+    check_wrenches,
+)
+from coop_drake.verification.runs.rows import Between, Rows, RunSetup, check_complete, check_motion
+
+SAME = 1e-9
+"""A run may begin this far from the plan's start [m, rad, and per s]: rounding."""
+
+
+def check_start(rows: Rows, displacement: FloatArray) -> Check:
+    """Check that the run begins at rest where the scenario says, with p_G at the plan's start.
+
+    Under a budget the team may stand off the plan's start by the largest errors of measurement, as a team
+    does that has come to rest with constant ones.
+
+    Args:
+        rows: The log.
+        displacement: How far the team stands off the plan's start, shape (3 + n,) [m, rad].
+
+    Raises:
+        RefusalError: Names the entry and the value.
+    """
+    plan, start = rows.plan, rows.plan.start + displacement
+    for name, expected in (
+        ("object_pose", start[:3]),
+        ("joints", start[3:]),
+        ("object_twist", np.zeros(3)),
+        ("joint_rates", np.zeros(len(start) - 3)),
+        ("governor_position", plan.start[:2]),
+    ):
+        rows.require_same(name, expected[None], SAME)
+    away = float(np.hypot(*displacement[:2])), float(np.abs(displacement[2:]).max())
+    if (budget := plan.budget) is not None:
+        most = budget.position_noise, budget.angle_noise if budget.axes else np.inf
+        for name, found, allowed in zip(("object_pose[0]", "joints[0]"), away, most, strict=True):
+            if not found <= allowed + SAME:
+                told = f"is off the plan's start by {found:.6g} m or rad; the budget has {allowed:.6g}"
+                raise RefusalError(name, told)
+    return Check("the run begins at rest, at the plan's start", 1, away[0], "m from the plan's start")
+
+
+def check_arrival(rows: Rows, problem: PlanningProblem) -> Check:
+    """Check that the run states its arrival, and that it ends at the goal within the tolerances.
+
+    Raises:
+        RefusalError: Names the entry and the value.
+    """
+    log, plan = rows.log, rows.plan
+    if not log.reached or log.violation:
+        raise RefusalError("reached", f"is {log.reached}: {log.violation or 'the run did not arrive'}")
+    last = len(log.times) - 1
+    away = float(np.hypot(*(rows.z[-1, :2] - plan.goal_pose[:2])))
+    if not away <= problem.position_tolerance:
+        allowed = f"{problem.position_tolerance} m are tolerated"
+        raise RefusalError(f"object_pose[{last}]", f"is {away:.6g} m from the goal; {allowed}")
+    goals = (float(plan.goal_pose[2]), *plan.goal_joints)
+    tolerances = (problem.angle_tolerance, *[problem.joint_tolerance] * len(plan.goal_joints))
+    for axis, (goal, tolerance) in enumerate(zip(goals, tolerances, strict=True)):
+        if goal is not None and not abs(rows.z[-1, 2 + axis] - goal) <= tolerance:
+            name = f"object_pose[{last}, 2]" if axis == 0 else f"joints[{last}, {axis - 1}]"
+            found = f"is {rows.z[-1, 2 + axis]:.6g}; the goal is {goal} within {tolerance}"
+            raise RefusalError(name, found)
+    return Check("the run ends at the goal", 1, away, "m from the goal's position")
+
 
 _FORCES = "the equations of motion, for more than actuators, damping and rigid grasps acts on the bodies"
 
