@@ -17,11 +17,11 @@ from benchmarks.rows import Row
 from benchmarks.tasks import Task
 from coop_drake import Found, Plan, load_scenario, plan
 from coop_drake.answers.log import SimulationLog
+from coop_drake.apart import DirectExchange, simulate_apart, simulate_in_processes
+from coop_drake.apart.membership import Stop
 from coop_drake.diagram import control_period
 from coop_drake.errors import PlanError
 from coop_drake.harmonic_maps import HarmonicMap
-from coop_drake.nodes import DirectExchange, simulate_apart, simulate_in_processes
-from coop_drake.nodes.membership import Stop
 from coop_drake.scenario import Deployment, Scenario
 from coop_drake.simulation import Sample, build_maps, simulate
 

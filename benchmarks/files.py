@@ -21,7 +21,7 @@ from rich.table import Table
 PACKAGE = str(Path(__file__).parents[1] / "coop_drake") + os.sep
 CLOSED = str(Path(__file__).parent / "scenarios" / "three_closed.scenario.yaml")
 DEPLOYED = "deployment: {preset: mobile_base, budget: all}"
-APART = ("messages", "nodes", "apart")
+APART = ("apart",)
 """Folders that only robots as processes of their own need."""
 
 

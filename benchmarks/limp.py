@@ -13,13 +13,13 @@ from benchmarks.rejoining import KILLED, label_of
 from benchmarks.rows import Row
 from benchmarks.tasks import Task
 from coop_drake import Plan, load_scenario
+from coop_drake.apart import DirectExchange, simulate_apart
+from coop_drake.apart.membership import TOLERATED
+from coop_drake.apart.messages import SUPERVISOR
+from coop_drake.apart.node import Stillness
 from coop_drake.diagram import brakes_of, build_station, control_period
 from coop_drake.harmonic_maps import HarmonicMap
 from coop_drake.laws.braking import braking_effort
-from coop_drake.messages import SUPERVISOR
-from coop_drake.nodes.membership import TOLERATED
-from coop_drake.nodes.one_process import DirectExchange, simulate_apart
-from coop_drake.nodes.stillness import Stillness
 from coop_drake.scenario import Control, Floor, Hold, Scenario
 from coop_drake.tree.pose import FloatArray
 

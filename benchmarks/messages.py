@@ -10,21 +10,19 @@ from time import perf_counter, process_time
 
 from benchmarks.rows import Row, best_seconds
 from benchmarks.tasks import Task
-from coop_drake.errors import MessagingError
-from coop_drake.messages import (
+from coop_drake.apart.messages import (
     SUPERVISOR,
     WORLD,
-    AddressBook,
     Effort,
     Goodbye,
-    KeyPair,
-    RobotEnd,
     Sample,
-    WorldEnd,
-    local_book,
-    make_keys,
+    decode,
+    decoder_of,
+    encode,
 )
-from coop_drake.messages.codec import decode, encode, header_of
+from coop_drake.apart.team_files import local_book, make_keys
+from coop_drake.apart.transport import Ends, Network
+from coop_drake.errors import MessagingError
 
 __all__ = ["message_tasks", "round_trip"]
 
@@ -38,7 +36,7 @@ _CODED = 1000
 _REPEATS = 5
 
 _SAMPLE = Sample(1, 0.005, True, False, 0, 0.0, 0.0, (1.0, 2.0, 0.5), tuple(0.1 * i for i in range(10)))
-_EFFORT = Effort(1, 0.0, 0, 0, (1.0, 2.0, 3.0, 4.0, 5.0))
+_EFFORT = Effort(1, 0.0, 0, 0, (1.0, 2.0, 3.0, 4.0, 5.0), ())
 """What a robot with two joints is sent at every sample, and what it answers."""
 
 
@@ -56,12 +54,11 @@ def _rows() -> list[Row]:
             Row(f"apart/cost/messages/{name}/round_trip", 1e6 * wall, "us", "pipe", 1e6 * piped[0]),
             Row(f"apart/cost/messages/{name}/cpu", 1e6 * processor, "us", "pipe", 1e6 * piped[1]),
         ]
-    data = encode(_SAMPLE, WORLD, 1, 1)
-    allowed = (header_of(data).kind,)
+    data, decoder = encode(1, 1, _SAMPLE), decoder_of(WORLD, 0)
     pickled = pickle.dumps(_SAMPLE)
     for name, work, peer in (
-        ("encode", lambda: encode(_SAMPLE, WORLD, 1, 1), lambda: pickle.dumps(_SAMPLE)),
-        ("decode", lambda: decode(data, header_of(data), allowed), lambda: pickle.loads(pickled)),
+        ("encode", lambda: encode(1, 1, _SAMPLE), lambda: pickle.dumps(_SAMPLE)),
+        ("decode", lambda: decode(data, decoder), lambda: pickle.loads(pickled)),
     ):
         rows.append(Row(f"apart/cost/messages/bytes/{name}", _each(work), "us", "pickle", _each(peer)))
     rows.append(Row("apart/cost/messages/bytes/size", len(data), "bytes", "pickle", len(pickled)))
@@ -93,8 +90,10 @@ def round_trip(trips: int, *, encrypted: bool) -> tuple[float, float]:
     """
     keys = {index: make_keys() for index in (0, SUPERVISOR, WORLD)} if encrypted else {}
     book = local_book(1, keys)
-    world = WorldEnd(book, keys=keys.get(WORLD))
-    process = get_context("spawn").Process(target=_answer, args=(book, keys.get(0)), daemon=True)
+    world = Ends(Network(book, keys=keys.get(WORLD)), WORLD)
+    process = get_context("spawn").Process(
+        target=_answer, args=(Network(book, keys=keys.get(0)),), daemon=True
+    )
     process.start()
 
     def heard() -> None:
@@ -102,8 +101,7 @@ def round_trip(trips: int, *, encrypted: bool) -> tuple[float, float]:
             raise MessagingError("the process of the benchmark did not answer")
 
     try:
-        for _ in range(2):  # Its session on each of the two channels.
-            heard()
+        heard()  # Its session.
         wall, processor = perf_counter(), process_time()
         for _ in range(trips):
             world.send(0, _SAMPLE)
@@ -115,10 +113,10 @@ def round_trip(trips: int, *, encrypted: bool) -> tuple[float, float]:
         world.close()
 
 
-def _answer(book: AddressBook, keys: KeyPair | None) -> None:
-    robot = RobotEnd(book, 0, keys=keys)
+def _answer(network: Network) -> None:
+    robot = Ends(network, 0)
     while (taken := robot.receive(_LIMIT)) is not None and not isinstance(taken[1], Goodbye):
-        robot.efforts.send(_EFFORT)
+        robot.send(WORLD, _EFFORT)
     robot.close()
 
 
@@ -127,7 +125,7 @@ def _piped(trips: int) -> tuple[float, float]:
     here, there = get_context("spawn").Pipe()
     process = get_context("spawn").Process(target=_answer_piped, args=(there,), daemon=True)
     process.start()
-    data = encode(_SAMPLE, WORLD, 1, 1)
+    data = encode(1, 1, _SAMPLE)
     here.send_bytes(data)
     here.recv_bytes()
     wall, processor = perf_counter(), process_time()
@@ -141,6 +139,6 @@ def _piped(trips: int) -> tuple[float, float]:
 
 
 def _answer_piped(there: Connection) -> None:
-    data = encode(_EFFORT, 0, 1, 1)
+    data = encode(1, 1, _EFFORT)
     while there.recv_bytes():
         there.send_bytes(data)

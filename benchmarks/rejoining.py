@@ -13,10 +13,10 @@ from benchmarks.departures import deployment_of, planned_transport
 from benchmarks.rows import Row
 from benchmarks.tasks import Task
 from coop_drake import Plan, SimulationLog, load_scenario
+from coop_drake.apart import LocalTeam, network_of, run_world
+from coop_drake.apart.messages import SUPERVISOR, name_of
 from coop_drake.diagram import control_period
 from coop_drake.harmonic_maps import HarmonicMap
-from coop_drake.messages import SUPERVISOR, local_book, name_of
-from coop_drake.nodes import LocalTeam, robots_of, run_world
 from coop_drake.scenario import Scenario
 
 __all__ = ["killed", "label_of", "rejoining_tasks"]
@@ -71,9 +71,9 @@ def killed(
         index: Who is killed.
         at: When, in simulated time [s].
     """
-    book, facts = local_book(robots_of(scenario)), dict[str, Any]()
+    network, facts = network_of(scenario, plan), dict[str, Any]()
     fault = round(at / control_period(scenario))
-    with LocalTeam(scenario, plan, maps, book, restarts=1) as team:
+    with LocalTeam(scenario, plan, maps, network, restarts=1) as team:
 
         def kill(sample: int) -> None:
             if sample == fault:
@@ -81,9 +81,8 @@ def killed(
                 team.processes[index].join()
 
         log = run_world(
-            scenario, plan, book, gone=team.gone, revive=team.revive, before=kill,
-            report=facts.update, patience=_PATIENCE,
-        )  # fmt: skip
+            scenario, plan, network, processes=team, before=kill, report=facts.update, patience=_PATIENCE
+        )
     return [Row(f"{name}/{figure}", value, unit) for figure, value, unit in _figures(log, facts["stops"], at)]
 
 

@@ -9,6 +9,7 @@ _EXTRAS = {
     "defusedxml": "robots",
     "distributed": "campaign",
     "ezdxf": "floor-plans",
+    "msgspec": "apart",
     "pyarrow": "campaign",
     "svgelements": "floor-plans",
     "tinycss2": "floor-plans",

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from rich.markup import escape
 
+from coop_drake.apart import REJOIN
 from coop_drake.cli.options import (
     FaultsFile,
     FreeRunning,
@@ -30,12 +30,13 @@ from coop_drake.cli.results import ResultFolder
 from coop_drake.cli.run import carry_out, faults_of, live_page
 from coop_drake.cli.simulate import read_plan
 from coop_drake.cli.task import Task, map_cells, read_task
-from coop_drake.nodes.states import REJOIN
 from coop_drake.viz.drawing_processes import DrawingProcesses
 
 if TYPE_CHECKING:
     from coop_drake.answers import Plan
-    from coop_drake.messages import AddressBook, KeyPair
+    from coop_drake.answers.log import SimulationLog
+    from coop_drake.apart.transport import Network
+    from coop_drake.scenario import Scenario
 
 EXAMPLES = (
     ("apart keys --robots 2 --out keys", "for processes on this machine that prove who they are"),
@@ -96,7 +97,7 @@ def keys_command(
         ),
     ] = None,
     port: Annotated[
-        int, typer.Option("--port", metavar="P", help="First of three ports that processes listen on.")
+        int, typer.Option("--port", metavar="P", help="First of two ports that processes listen on.")
     ] = _FIRST_PORT,
     out: Annotated[Path, out_folder("A new folder for the files.")] = Path("keys"),
     machine: Machine = False,
@@ -104,8 +105,8 @@ def keys_command(
 ) -> None:
     """Write an address book with public keys, and a private key for each process, for its owner alone."""
     with reporting(machine=machine, quiet=quiet) as reporter:
+        from coop_drake.apart.team_files import make_team_files
         from coop_drake.errors import ScenarioError
-        from coop_drake.messages import make_team_files
         from coop_drake.typed_data import DataError
 
         try:
@@ -132,13 +133,13 @@ def supervisor_command(
 ) -> None:
     """Be the supervisor of a team, until the world says that the run is over."""
     with reporting(machine=machine, quiet=quiet) as reporter:
-        from coop_drake.messages import SUPERVISOR
-        from coop_drake.nodes import run_supervisor
+        from coop_drake.apart import run_node
+        from coop_drake.apart.messages import SUPERVISOR
 
         task, found = _problem_of(scenario, gains, plan, reporter)
-        book, keys = _place_of(task, addresses, key, SUPERVISOR)
+        network = _network_of(task, found, addresses, key, faults, SUPERVISOR)
         reporter.say("The supervisor looks for the world and waits for all robots")
-        outcome = run_supervisor(task.scenario, found, book, keys=keys, faults=faults_of(task, faults))
+        outcome = run_node(task.scenario, found, (), SUPERVISOR, network)
         reporter.facts.update(outcome=outcome)
         reporter.code = ExitCode.DONE if outcome == 0 else ExitCode.FAILED_RUN
 
@@ -157,18 +158,16 @@ def robot_command(
 ) -> None:
     """Be one robot of a team, until the world says that the run is over."""
     with reporting(machine=machine, quiet=quiet) as reporter:
-        from coop_drake.nodes import robots_of, run_robot
+        from coop_drake.apart import robots_of, run_node
 
         task, found = _problem_of(scenario, gains, plan, reporter)
         robots = robots_of(task.scenario)
         if robot >= robots:
             raise typer.BadParameter(f"K = {robot}: the team has robots 0 to {robots - 1}.")
-        book, keys = _place_of(task, addresses, key, robot)
+        network = _network_of(task, found, addresses, key, faults, robot)
         maps = map_cells(task, found, reporter)
         reporter.say(f"Robot {robot} looks for the world and the supervisor")
-        outcome = run_robot(
-            task.scenario, found, maps, robot, book, keys=keys, faults=faults_of(task, faults)
-        )
+        outcome = run_node(task.scenario, found, maps, robot, network)
         reporter.facts.update(robot=robot, outcome=outcome)
         reporter.code = ExitCode.DONE if outcome == 0 else ExitCode.FAILED_RUN
 
@@ -194,27 +193,23 @@ def world_command(
 ) -> None:
     """Simulate and record a team whose robots and supervisor are processes of their own."""
     with reporting(machine=machine, quiet=quiet, verbose=verbose) as reporter:
-        from coop_drake.messages import WORLD
-        from coop_drake.nodes import simulate_world, wall_clock
+        from coop_drake.apart import run_world, wall_clock
+        from coop_drake.apart.messages import WORLD
 
         task, found = _problem_of(scenario, gains, plan, reporter)
         folder = ResultFolder.of(task.name, out, "simulation")
-        book, keys = _place_of(task, addresses, key, WORLD)
+        network = _network_of(task, found, addresses, key, faults, WORLD)
+        pacing = wall_clock(task.scenario) if free_running else None
         reporter.say("The world waits for the supervisor and all robots")
         with (
             DrawingProcesses(figures=not no_figures) as drawing,
             live_page(task, found, reporter, live=live, wait=wait) as page,
         ):
-            world = partial(
-                simulate_world,
-                book=book,
-                keys=keys,
-                pacing=wall_clock(task.scenario) if free_running else None,
-                rejoin=rejoin,
-                faults=faults_of(task, faults),
-                report=reporter.facts.update,
-                tell=reporter.say,
-            )
+
+            def world(scenario: Scenario, plan: Plan, maps: Any, **options: Any) -> SimulationLog:
+                options |= {"report": reporter.facts.update, "tell": reporter.say, "pacing": pacing}
+                return run_world(scenario, plan, network, rejoin=rejoin, **options)
+
             reporter.code = carry_out(
                 task, found, folder, reporter, drawing, page, world, fresh_maps=fresh_maps
             )
@@ -236,18 +231,18 @@ def _problem_of(
     return task, read_plan(task, plan or ResultFolder.of(task.name, None).plan, reporter)
 
 
-def _place_of(
-    task: Task, addresses: Path, key: Path | None, index: int
-) -> tuple[AddressBook, KeyPair | None]:
-    """Read the address book and the private key of a process, by its index in messages.
+def _network_of(
+    task: Task, plan: Plan, addresses: Path, key: Path | None, faults: Path | None, index: int
+) -> Network:
+    """Read the address book, the private key of a process by its index in messages, and faults.
 
     Raises:
-        ScenarioError: A file is wrong, or the book is for another number of robots.
+        ScenarioError: A file is wrong, or is for another number of robots.
     """
-    from coop_drake.messages import load_address_book, load_own_keys
-    from coop_drake.messages.team_files import key_file
-    from coop_drake.nodes import robots_of
+    from coop_drake.apart import network_of, robots_of
+    from coop_drake.apart.team_files import key_file, load_address_book, load_own_keys
 
     book = load_address_book(addresses, robots_of(task.scenario))
     beside = addresses.parent / key_file(index)
-    return book, load_own_keys(book, index, key or (beside if beside.exists() else None))
+    keys = load_own_keys(book, index, key or (beside if beside.exists() else None))
+    return network_of(task.scenario, plan, book, keys, faults_of(task, faults))

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import typer
 from rich.markup import escape
 
+from coop_drake.apart import REJOIN, RESTARTS
 from coop_drake.cli.options import (
     Apart,
     Effort,
@@ -42,14 +43,13 @@ from coop_drake.cli.summary import (
     summary_rows,
 )
 from coop_drake.cli.task import Task, map_cells, read_task, write_accuracies
-from coop_drake.nodes.states import REJOIN, RESTARTS
 from coop_drake.viz.drawing_processes import DrawingProcesses
 
 if TYPE_CHECKING:
     from coop_drake.answers import Plan
     from coop_drake.answers.log import SimulationLog
+    from coop_drake.apart.faults import Faults
     from coop_drake.harmonic_maps import HarmonicMap
-    from coop_drake.messages.faults import Faults
     from coop_drake.viz import LivePage
 
 Simulation: TypeAlias = "Callable[..., SimulationLog]"
@@ -130,8 +130,8 @@ def simulation_of(
         raise typer.BadParameter("--faults needs --apart: they are those of messages between processes.")
     if not apart:
         return _in_one_process
+    from coop_drake.apart import simulate_in_processes, wall_clock
     from coop_drake.diagram import control_period
-    from coop_drake.nodes import simulate_in_processes, wall_clock
 
     control_period(task.scenario)
     wrong = faults_of(task, faults)
@@ -236,8 +236,8 @@ def faults_of(task: Task, path: Path | None) -> Faults:
     Raises:
         ScenarioError: The file is wrong, or is about a robot that the team does not have.
     """
-    from coop_drake.messages.faults import NO_FAULTS, load_faults
-    from coop_drake.nodes import robots_of
+    from coop_drake.apart import robots_of
+    from coop_drake.apart.faults import NO_FAULTS, load_faults
 
     return NO_FAULTS if path is None else load_faults(path, robots_of(task.scenario))
 

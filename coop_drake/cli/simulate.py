@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.markup import escape
 
+from coop_drake.apart import REJOIN, RESTARTS
 from coop_drake.cli.options import (
     Apart,
     FaultsFile,
@@ -30,7 +31,6 @@ from coop_drake.cli.run import carry_out, live_page, simulation_of
 from coop_drake.cli.summary import plan_facts
 from coop_drake.cli.task import Task, read_task
 from coop_drake.errors import RefusalError
-from coop_drake.nodes.states import REJOIN, RESTARTS
 from coop_drake.viz.drawing_processes import DrawingProcesses
 
 if TYPE_CHECKING:

@@ -7,12 +7,11 @@ import numpy as np
 import pytest
 
 from coop_drake.answers.plan import Found
+from coop_drake.apart import DirectExchange, RobotNode, simulate_apart
+from coop_drake.apart.messages import Place, Switch
 from coop_drake.chain import plan
 from coop_drake.diagram import build_station
 from coop_drake.diagram.knowledge import robot_knowledge
-from coop_drake.messages import Place, Switch
-from coop_drake.nodes import RobotNode
-from coop_drake.nodes.one_process import DirectExchange, simulate_apart
 from coop_drake.scenario import load_scenario
 from coop_drake.simulation import build_maps, simulate
 from tests.support.cli import invoke

@@ -1,0 +1,29 @@
+from .one_process import DirectExchange, simulate_apart
+from .processes import (
+    LocalTeam,
+    network_of,
+    robots_of,
+    run_node,
+    run_world,
+    simulate_in_processes,
+    wall_clock,
+)
+from .robot import RobotNode
+from .supervisor import SupervisorNode
+
+REJOIN: float
+RESTARTS: int
+
+__all__ = [
+    "DirectExchange",
+    "LocalTeam",
+    "RobotNode",
+    "SupervisorNode",
+    "network_of",
+    "robots_of",
+    "run_node",
+    "run_world",
+    "simulate_apart",
+    "simulate_in_processes",
+    "wall_clock",
+]

@@ -1,0 +1,373 @@
+"""A team as processes: what each of them runs, how a run starts all on this machine, and the world's run."""
+
+from __future__ import annotations
+
+import gc
+import os
+import pickle
+import signal
+import subprocess
+import sys
+import time as clocks
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from multiprocessing import get_context
+from multiprocessing.process import BaseProcess
+from types import TracebackType
+from typing import Any, NoReturn
+
+from pydrake.systems.framework import DiagramBuilder
+
+from coop_drake.answers.budget import Budget
+from coop_drake.answers.log import SimulationLog
+from coop_drake.answers.plan import Plan
+from coop_drake.answers.plan_file import plan_digest
+from coop_drake.apart import REJOIN, RESTARTS
+from coop_drake.apart.faults import NO_FAULTS, Faults
+from coop_drake.apart.membership import TOLERATED, Processes
+from coop_drake.apart.messages import SUPERVISOR, WORLD, Goodbye, name_of
+from coop_drake.apart.node import TURN, NodeProcess
+from coop_drake.apart.robot import RobotNode, RobotProcess, certified_age
+from coop_drake.apart.supervisor import SupervisorNode, SupervisorProcess
+from coop_drake.apart.team_files import AddressBook, KeyPair, local_book
+from coop_drake.apart.transport import Ends, Network
+from coop_drake.apart.world import PATIENCE, Pacing, SampleExchange
+from coop_drake.diagram import brakes_of, build_world, control_period
+from coop_drake.diagram.knowledge import hold_of, robot_knowledge
+from coop_drake.diagram.station import build_station
+from coop_drake.errors import CoopDrakeError, MessagingError
+from coop_drake.harmonic_maps import HarmonicMap
+from coop_drake.interrupts import uninterrupted
+from coop_drake.plant import build_team_plant
+from coop_drake.plant.scenario_digest import scenario_digest
+from coop_drake.progress import Progress
+from coop_drake.scenario import Deployment, Scenario
+from coop_drake.simulation import Sample, run_loop
+
+ARRIVED, FAILED, INTERRUPTED = range(3)
+"""Outcomes, see ``messages.Goodbye``."""
+
+_CONTEXT = get_context("fork") if sys.platform == "linux" else get_context("spawn")
+"""A copy has imported already what this process has; libraries of macOS may not be used in one."""
+
+_OPENING = 30.0
+"""How long processes wait for each other at the start [s]: a slow machine imports Drake for some seconds."""
+
+_REPORTED = 0.1
+"""Simulated time between two reports of facts about the processes [s]: as often as people can read them."""
+
+
+def network_of(
+    scenario: Scenario,
+    plan: Plan,
+    book: AddressBook | None = None,
+    keys: KeyPair | None = None,
+    faults: Faults = NO_FAULTS,
+) -> Network:
+    """Return what a process needs to speak with the team of a scenario and a plan.
+
+    Args:
+        scenario: The scenario.
+        plan: The plan that all have.
+        book: Who listens where; free ports of this machine by default.
+        keys: The process' own keys, None where the book has none.
+        faults: What goes wrong with messages that it sends, and with the robots' clocks.
+
+    Raises:
+        ScenarioError: Robots do not compute at common samples.
+    """
+    period, known = control_period(scenario), book or local_book(robots_of(scenario))
+    return Network(known, scenario_digest(scenario), plan_digest(plan), keys, faults, period)
+
+
+def robots_of(scenario: Scenario) -> int:
+    """Return the number of robots of a scenario."""
+    return len(build_team_plant(scenario, DiagramBuilder()).robots)
+
+
+def run_node(
+    scenario: Scenario,
+    plan: Plan,
+    maps: Sequence[HarmonicMap],
+    index: int,
+    network: Network,
+    *,
+    wanted: Callable[[], bool] = lambda: True,
+) -> int:
+    """Be one robot or the supervisor until the world says goodbye; return the outcome that it names.
+
+    Args:
+        scenario: The scenario.
+        plan: The plan that all have.
+        maps: The harmonic map of every transition, which the supervisor does not need.
+        index: Index of the process in messages.
+        network: What it needs to speak with its team.
+        wanted: Says whether the process shall go on; asked while nothing comes.
+
+    Raises:
+        MessagingError: The others cannot be reached, or fall silent.
+    """
+    node: RobotNode | SupervisorNode
+    if index == SUPERVISOR:
+        robots = len(network.book.robots)
+        node = SupervisorNode(robots, len(plan.cells), network.period, hold_of(scenario, plan))
+    else:
+        team = build_station(scenario).team
+        known = robot_knowledge(scenario, plan, maps, team)[index]
+        node = RobotNode(known, scenario.deployment, index, team.robots[index].name)
+    ends = Ends(network, index)
+    try:
+        ends.open(_OPENING)
+        process: NodeProcess = (
+            SupervisorProcess(node, ends, robots)
+            if isinstance(node, SupervisorNode)
+            else RobotProcess(node, ends)
+        )
+        return process.run(wanted)
+    finally:
+        ends.close()
+        node.release()
+
+
+class _FreshProcess(subprocess.Popen[bytes]):
+    """Calls a function in a new interpreter, with the interface of the processes of ``multiprocessing``.
+
+    A copy of a process that simulates would have its sockets, too. What ``multiprocessing`` starts anew
+    imports the main module of the program again, which for a script without a guard would run it again.
+
+    Args:
+        work: The function; it and its arguments are pickled.
+        arguments: Its arguments.
+    """
+
+    def __init__(self, work: Callable[..., Any], arguments: tuple[Any, ...]) -> None:
+        begin = "import pickle, sys; work, arguments = pickle.load(sys.stdin.buffer); work(*arguments)"
+        path = os.pathsep.join(folder for folder in sys.path if folder)
+        command, env = [sys.executable, "-c", begin], {**os.environ, "PYTHONPATH": path}
+        super().__init__(command, stdin=subprocess.PIPE, env=env)
+        assert self.stdin is not None
+        with self.stdin as pipe:
+            pickle.dump((work, arguments), pipe)
+
+    @property
+    def exitcode(self) -> int | None:
+        """Its exit code, None while it runs."""
+        return self.poll()
+
+    def join(self, timeout: float | None = None) -> None:
+        """Wait for its end, at most for a time [s]."""
+        with suppress(subprocess.TimeoutExpired):
+            self.wait(timeout)
+
+
+class LocalTeam(Processes):
+    """The processes of all robots and of their supervisor, copies of this one; they end with the block.
+
+    They have sessions of their own, so that Ctrl-C reaches only the command, which ends them.
+
+    Args:
+        scenario: The scenario.
+        plan: The plan.
+        maps: The harmonic map of every transition.
+        network: What they need to speak with each other.
+        restarts: How often ``revive`` starts each of them again.
+    """
+
+    def __init__(
+        self,
+        scenario: Scenario,
+        plan: Plan,
+        maps: Sequence[HarmonicMap],
+        network: Network,
+        *,
+        restarts: int = 0,
+    ) -> None:
+        self._problem, self._network = (scenario, plan, maps), network
+        self.processes = dict[int, BaseProcess | _FreshProcess]()
+        self._left = dict.fromkeys((SUPERVISOR, *range(len(network.book.robots))), restarts)
+
+    def __enter__(self) -> LocalTeam:
+        for index in self._left:
+            process = _CONTEXT.Process(target=_serve, args=self._given(index), daemon=True)
+            with uninterrupted():
+                process.start()
+            self.processes[index] = process
+        return self
+
+    def revive(self, index: int) -> bool:
+        """Start a process again that has ended, unless this was done too often; return whether it was."""
+        if not self._left[index]:
+            return False
+        self._left[index] -= 1
+        with uninterrupted():
+            self.processes[index] = _FreshProcess(_serve, self._given(index))
+        return True
+
+    def gone(self) -> set[int]:
+        """Return the indices of the processes that have ended."""
+        return {index for index, process in self.processes.items() if process.exitcode is not None}
+
+    def _given(self, index: int) -> tuple[Any, ...]:
+        """Return the arguments of a process' work."""
+        return (*self._problem, index, self._network), os.getpid()
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        for process in self.processes.values():
+            process.join(1.0 if kind is None else 0.0)
+            if process.exitcode is None:
+                process.kill()
+                process.join()
+
+
+def _serve(arguments: tuple[Any, ...], parent: int) -> NoReturn:
+    """Do the work of a process until its parent is gone."""
+    os.setsid()
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        run_node(*arguments, wanted=lambda: os.getppid() == parent)
+    except CoopDrakeError as error:
+        sys.stderr.write(f"{name_of(arguments[3])}: {error}\n")
+        sys.stderr.flush()
+        os._exit(1)
+    os._exit(0)
+
+
+def run_world(
+    scenario: Scenario,
+    plan: Plan,
+    network: Network,
+    *,
+    processes: Processes | None = None,
+    opening: float = 60.0,
+    pacing: Pacing | None = None,
+    patience: float = PATIENCE,
+    rejoin: float = REJOIN,
+    tell: Callable[[str], None] = lambda words: None,
+    before: Callable[[int], None] = lambda sample: None,
+    report: Callable[[dict[str, Any]], None] = lambda facts: None,
+    progress: Progress | None = None,
+    observer: Callable[[Sample], None] | None = None,
+) -> SimulationLog:
+    """Wait for all robots and the supervisor, simulate the transport, and say goodbye to all.
+
+    Args:
+        scenario: The scenario.
+        plan: The plan that all have.
+        network: What the world needs to speak with the team.
+        processes: Knows which processes have ended, and may start them again.
+        opening: How long to wait for the others [s].
+        pacing: Keeps the pace of the wall clock, see ``SampleExchange``; as ``patience`` and ``before``.
+        patience: How long a process may take for an answer in lock-step [s].
+        rejoin: How long a team at rest waits for who is missing [s], by the wall clock.
+        tell: Is told what happens to processes.
+        before: Called before every sample with its number.
+        report: Called ten times in a simulated second, and at the end, with facts about the processes.
+        progress: Called with the stage and the fraction done, if given.
+        observer: Called with every accepted step.
+
+    Raises:
+        MessagingError: Somebody is missing.
+    """
+    ends, outcome = Ends(network, WORLD), INTERRUPTED
+    known, every = processes or Processes(), max(1, round(_REPORTED / network.period))
+
+    def begin(sample: int) -> None:
+        before(sample)
+        if sample % every == 0:
+            report(exchange.facts())
+
+    exchange = SampleExchange(
+        ends,
+        network,
+        pacing=pacing,
+        tolerated=tolerated_age(scenario.deployment, plan.budget),
+        oldest=certified_age(plan.budget) + TOLERATED,
+        processes=known,
+        patience=patience,
+        rejoin=rejoin,
+        before=begin,
+        tell=tell,
+    )
+    world = build_world(scenario, plan, exchange)
+    exchange.brakes = brakes_of(scenario, world.team)
+    if pacing is not None:
+        gc.freeze()  # To collect garbage among all that was imported takes a tenth of a second.
+    try:
+        _open(ends, opening, known)
+        log = run_loop(world, scenario, progress=progress, observer=observer)
+        report(exchange.facts())
+        outcome = ARRIVED if log.reached and not log.violation else FAILED
+        return log
+    finally:
+        for index in ends.present():
+            ends.send(index, Goodbye(outcome))
+        ends.close()
+        world.release()
+        if pacing is not None:
+            gc.unfreeze()
+
+
+def _open(ends: Ends, limit: float, processes: Processes) -> None:
+    """Wait for everybody.
+
+    Raises:
+        MessagingError: Somebody does not come in time, or has ended.
+    """
+    deadline = clocks.monotonic() + limit
+    while True:
+        try:
+            return ends.open(min(TURN, limit))
+        except MessagingError as error:
+            if ended := processes.gone():
+                names = ", ".join(name_of(index) for index in sorted(ended))
+                raise MessagingError(f"the process of {names} ended before the start") from error
+            if clocks.monotonic() > deadline:
+                raise MessagingError(f"{error}, {limit:g} s in all") from error
+
+
+def simulate_in_processes(
+    scenario: Scenario,
+    plan: Plan,
+    maps: Sequence[HarmonicMap],
+    *,
+    restarts: int = RESTARTS,
+    faults: Faults = NO_FAULTS,
+    **options: Any,
+) -> SimulationLog:
+    """Start all robots and the supervisor as processes on this machine, and be the world for them.
+
+    Args:
+        scenario: The scenario.
+        plan: A plan for it.
+        maps: The harmonic map of every transition.
+        restarts: How often each of them is started again where it ends before the run is over.
+        faults: What goes wrong between the processes.
+        options: As for :func:`run_world`.
+
+    Raises:
+        MessagingError: A process ended before the start.
+        ScenarioError: Robots do not compute at common samples.
+    """
+    network = network_of(scenario, plan, faults=faults)
+    with LocalTeam(scenario, plan, maps, network, restarts=restarts) as team:
+        return run_world(scenario, plan, network, processes=team, **options)
+
+
+def wall_clock(scenario: Scenario) -> Pacing:
+    """Return the pace of the wall clock for a scenario.
+
+    Commands may be as old as measurements are when robots use them, for which the plan's budget holds; where
+    these have no delay, one control period old.
+    """
+    return Pacing(max(scenario.deployment.whole_delay, control_period(scenario)))
+
+
+def tolerated_age(deployment: Deployment, budget: Budget | None) -> float:
+    """Return how long drives hold the last effort of a robot that gives no other, before all brake [s].
+
+    Under a budget this is what its delay leaves beside that of measurements: a plan promises nothing where
+    efforts rest on older ones.
+    """
+    return TOLERATED if budget is None else max(0.0, budget.delay - deployment.whole_delay)

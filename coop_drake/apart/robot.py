@@ -1,0 +1,573 @@
+"""One robot: its controller behind its radio, computed at samples that the world gives, and its process."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from math import inf
+from time import monotonic
+from typing import Any
+
+import numpy as np
+from pydrake.systems.framework import Context
+from shapely import Point
+from shapely.ops import nearest_points
+
+from coop_drake.answers.budget import Budget
+from coop_drake.apart.messages import (
+    SUPERVISOR,
+    WORLD,
+    AtRest,
+    Begin,
+    Effort,
+    Hold,
+    HoldRequest,
+    Place,
+    Ready,
+    Sample,
+    Switch,
+    Telemetry,
+)
+from coop_drake.apart.node import (
+    AGAIN,
+    ASKS,
+    FOLLOWS,
+    HOLDS,
+    LASTING,
+    LATE,
+    LOSSY_REPORT_TIMEOUT,
+    MOVES,
+    OUTSIDE,
+    REPORT_TIMEOUT,
+    RETURNS,
+    STANDS,
+    NodeProcess,
+    SampledDiagram,
+    Stillness,
+    row_of,
+)
+from coop_drake.apart.transport import Ends
+from coop_drake.diagram.deployment import deploy
+from coop_drake.diagram.robot_controller import RobotKnowledge, build_robot_controller
+from coop_drake.laws.axis_table import GOAL_LOWER, GOAL_UPPER, SLICE_LOWER, SLICE_UPPER, track_row
+from coop_drake.laws.beginning import (
+    LONGEST_RETURN,
+    PULL,
+    RATE,
+    WIDEST_RETURN,
+    closed_after,
+    slow_motion,
+    slow_samples,
+)
+from coop_drake.laws.chain_motion import PX, PY, move_chain
+from coop_drake.laws.departure import BRAKES
+from coop_drake.laws.nominal_axes import place_on_axes
+from coop_drake.laws.sampling import period_of, whole_periods
+from coop_drake.plant import robot_chain
+from coop_drake.plant.chain import is_circle
+from coop_drake.scenario import Deployment
+from coop_drake.systems import axis_laws, robot_record
+from coop_drake.tree.circles import whole_turns
+from coop_drake.tree.pose import FloatArray
+
+Said = list[Ready | HoldRequest | AtRest]
+"""What a robot tells the supervisor."""
+
+
+ROOM = 0.01
+"""What a rest to which drives bring a robot leaves to the boundary of its region, and beside the departure to
+the ends of slices [m or rad]: several times what errors of measurements leave."""
+
+
+LONGEST_DOUBT = 0.05
+"""For how long a robot asks for a hold because of its measurements' age before it lets the drives brake [s]:
+with measurements 15 ms older than a plan holds for, a team that is held leaves its funnels after 0.6 s."""
+
+_ROUNDING = 1e-6
+"""Differences of times that are no difference [s]."""
+
+_SLEWED = 1e-3
+"""By how much a clock may be corrected while it runs, over the time that passes [-]."""
+
+
+def certified_age(budget: Budget | None) -> float:
+    """Return the largest age of measurements for which a plan holds [s]; infinite without a budget."""
+    if budget is None:
+        return inf
+    return whole_periods(budget.delay, budget.period) * budget.period + budget.age_error
+
+
+class StampCheck:
+    """Compares the stamps of one robot's measurements with its clock.
+
+    A plan holds for measurements that are as old as robots take them for, but for what the error of their
+    clocks hides, and with this error no older than its budget allows. Plans without a budget promise nothing,
+    and nothing is compared.
+
+    Args:
+        period: Control period [s].
+        budget: The plan's budget.
+        age: How old the robot takes its measurements for [s].
+    """
+
+    def __init__(self, period: float, budget: Budget | None, age: float) -> None:
+        self._period, self._age, self._compares = period, age, budget is not None
+        self._error = 0.0 if budget is None else budget.clock_error
+        self._oldest = certified_age(budget) - self._error
+        self._last: tuple[int, float, tuple[float, float]] | None = None
+
+    def doubts(self, number: int, time: float, stamps: tuple[float, float]) -> bool:
+        """Whether a measurement is older or younger than it may be, or a clock or a stamp has jumped.
+
+        Args:
+            number: Number of the sample.
+            time: What the robot's clock shows [s].
+            stamps: When the object's pose and the robot's state were measured [s].
+        """
+        if not self._compares:
+            return False
+        before, self._last = self._last, (number, time, stamps)
+        for stamp in stamps:
+            # What is measured before the start is what it was then.
+            age = min(number * self._period, self._age)
+            seems = time - stamp
+            if not (seems <= self._oldest + _ROUNDING and abs(seems - age) <= self._error + _ROUNDING):
+                return True
+        if not abs(stamps[0] - stamps[1]) <= _ROUNDING:
+            return True
+        if before is None:
+            return False
+        passed = (number - before[0]) * self._period
+        jumped = abs(time - before[1] - passed) > _ROUNDING + _SLEWED * passed
+        return jumped or any(now < then - _ROUNDING for now, then in zip(stamps, before[2], strict=True))
+
+
+@dataclass(frozen=True)
+class SlowMotion:
+    """The way from a rest to the middle of the goal intervals, see ``laws/beginning.py``.
+
+    Attributes:
+        begin: Number of the sample at which it begins.
+        samples: For how many periods it lasts.
+        axes: The object's angle and the robot's joints at its ends, shape (2, 1 + n) [rad or m].
+        position: The object's position at its ends, shape (2, 2) [m].
+    """
+
+    begin: int
+    samples: int
+    axes: FloatArray
+    position: FloatArray
+
+
+class RobotNode:
+    """Computes one robot's efforts and messages from its own measurements and what the supervisor says.
+
+    While its drives brake, it stands and says where the object rests. On the supervisor's order it goes
+    slowly to where its cell's law takes over, as all others do, see ``laws/beginning.py``. Where it departs
+    from its nominal motion by far more than its monitor allows, it stands at once, so that the drives brake.
+
+    Sensors may show the object's angle and joints without limits in any turn: each value counts in the turn
+    in which it is nearest to the one before, kept to the current cell's interval, so that wrong values do not
+    count turns; at first to the plan's start, and to the middle of the cell where the process was started
+    again.
+
+    Args:
+        knowledge: What the robot knows before the run.
+        deployment: How the team departs from the ideal one; sensors and actuators are part of the world.
+        robot: Index k of the robot.
+        name: Its name.
+
+    Attributes:
+        period: Control period [s].
+        place: The current cell as the robot knows it.
+        state: Its state, see ``messages.Effort``.
+        rest: Where its drives bring it if they brake now, z_k; None where it follows no nominal motion.
+    """
+
+    def __init__(self, knowledge: RobotKnowledge, deployment: Deployment, robot: int, name: str) -> None:
+        controller = build_robot_controller(knowledge)
+        self._deployed = deploy(controller, deployment, robot, name, bodiless=True)
+        self._controller, self._sampled = controller, SampledDiagram(self._deployed.diagram)
+        self.period, self._held = knowledge.period or 0.0, knowledge.hold is not None
+        self._monitored = knowledge.monitored is not None
+        self._joints = knowledge.joints.stop - knowledge.joints.start
+        self._state_size = 2 * (3 + self._joints)
+        self._axes = np.array([0, *range(1 + knowledge.joints.start, 1 + knowledge.joints.stop)])
+        self._tables = [law.table for law in axis_laws(knowledge.plan, self._axes.tolist())]
+        self._knowledge, self._plan, self._chain = knowledge, knowledge.plan, robot_chain(knowledge.robot)
+        record = robot_record(self._joints, holds=self._held, monitored=self._monitored)
+        self._logged = [name for name, size in record.items() if size]
+        self._cell, self._hold_message = np.zeros(2), np.zeros(2)
+        self._said, self._reported, self._told_rest = Ready(0, False), inf, -inf
+        self.place, self.state = Place(True, 0, 0), FOLLOWS
+        self.rest: FloatArray | None = None
+        self._order: Begin | None = None
+        self._slow: SlowMotion | None = None
+        self._stays_until, self._doubted = 0, 0
+        self._stamps = StampCheck(self.period, knowledge.plan.budget, knowledge.measured_age)
+        self._still = Stillness(self.period, LASTING)
+        self._timeout = self._samples_of(REPORT_TIMEOUT)
+        self._number = 0
+        endless = [3 + i for i, joint in enumerate(knowledge.robot.joints) if is_circle(joint)]
+        self._circles = [self._state_size + 2, *endless]
+        ends = [(cell.lower[self._axes], cell.upper[self._axes]) for cell in knowledge.plan.cells]
+        self._turns = [(self._of_circles(lower), self._of_circles(upper)) for lower, upper in ends]
+        self._near = self._of_circles(knowledge.plan.start[2:][self._axes])
+        start = np.array(knowledge.plan.start[:3])
+        self._sampled.at(0.0, self._inputs(np.concatenate([np.zeros(self._state_size), start])))
+        self._deployed.prepare(self._sampled.context, start[:2])
+
+    def _inputs(self, measured: FloatArray) -> dict[str, FloatArray]:
+        own = {"robot_state": measured[: self._state_size], "object_pose": measured[self._state_size :]}
+        heard = {"current_cell": self._cell}
+        return own | heard | ({"hold_message": self._hold_message} if self._held else {})
+
+    def _of_circles(self, values: FloatArray) -> FloatArray:
+        """Return which of the values of (theta, q...) are those of circles."""
+        return values[[0, *(place - 2 for place in self._circles[1:])]]
+
+    def _unwrapped(self, measured: FloatArray) -> FloatArray:
+        """Return what is measured with circles in the turn in which they are nearest to those before."""
+        turned = measured.copy()
+        turned[self._circles] += whole_turns(measured[self._circles], self._near)
+        return turned
+
+    def forget(self) -> None:
+        """Know no current cell: the process was started again during a run."""
+        self.place, self.state, self.rest = Place(False, 0, 0), ASKS, None
+
+    def meet(self) -> None:
+        """Tell the supervisor again what holds: it may be another process, which has heard nothing yet."""
+        self._said, self._reported, self._told_rest = Ready(self.place.cell, False), inf, -inf
+
+    def instant(self, time: float, sample: int) -> float:
+        """Return the time for which the robot computes a sample [s].
+
+        Nominal motions must be the same in all robots, whatever their clocks show: they count samples.
+
+        Args:
+            time: What the robot's clock shows [s].
+            sample: Number of the sample.
+        """
+        return time if self._plan.budget is None else sample * self.period
+
+    def look(self, time: float, measured: FloatArray) -> FloatArray:
+        """Return the robot's record for the log at an instant; nothing changes.
+
+        Args:
+            time: The instant [s].
+            measured: Its own state, then the object's pose, as it measures them.
+        """
+        self._sampled.at(time, self._inputs(self._unwrapped(measured)))
+        return row_of(self._sampled, self._controller, self._logged)
+
+    def step(
+        self,
+        time: float,
+        measured: FloatArray,
+        *,
+        sample: int | None = None,
+        stopped: bool = False,
+        stamps: tuple[float, float] | None = None,
+    ) -> tuple[FloatArray, Said]:
+        """Compute a sample; return the effort from now on, and what the robot tells the supervisor.
+
+        Args:
+            time: Time of the sample, as the robot's clock shows it [s].
+            measured: Its own state, then the object's pose, as it measures them.
+            sample: Number of the sample, that of the time by default; the robot's clock may be wrong.
+            stopped: Whether the drives brake.
+            stamps: When the object's pose and its own state were measured [s]; None for not judged.
+        """
+        self._number = period_of(time, self.period) if sample is None else sample
+        doubts = stamps is not None and self._stamps.doubts(self._number, time, stamps)
+        time = self.instant(time, self._number)
+        self._doubted = self._doubted + 1 if doubts else 0
+        longest = whole_periods(LONGEST_DOUBT, self.period) if self._held else 0
+        if self._doubted > longest and self.place.known:
+            self.state, self._slow, self._order = LATE, None, None
+            return np.zeros(3 + self._joints), []
+        measured = self._unwrapped(measured)
+        if self.place.known and np.isfinite(measured).all():
+            self._near = np.clip(measured[self._circles], *self._turns[self.place.cell])
+        if not self._moves(time, measured, stopped=stopped):
+            return np.zeros(3 + self._joints), self._stand(measured) if self.place.known else []
+        if self._slow is not None and not self._has_come(self._slow, time):
+            return self._go_slowly(self._slow, time, measured), self._requests()
+        self._sampled.at(time, self._inputs(measured))
+        brakes = self._monitored and row_of(self._sampled, self._controller, ["alarm"])[0] >= BRAKES
+        self._sampled.update()
+        held = self._held and self._hold_message[0] > 0.0
+        self.state = STANDS if brakes else HOLDS if held else FOLLOWS
+        self.rest = self._rest()
+        return self._sampled.output("robot_effort"), self._messages()
+
+    def hear(self, messages: Iterable[Any]) -> None:
+        """Take in what the supervisor says; it counts from the next instant on."""
+        for message in messages:
+            if isinstance(message, Switch):
+                if self.place.known and message.cell > self.place.cell and self._number - message.sample > 1:
+                    self._timeout = self._samples_of(LOSSY_REPORT_TIMEOUT)
+                if not self.place.known or message.sample > self.place.sample:
+                    self._enter(message.cell, message.sample)
+            elif isinstance(message, Hold):
+                self._hold_message = np.array([message.held, message.number], dtype=float)
+            elif isinstance(message, Begin) and len(message.object_pose) == 3:
+                self._order = message if message.cell < len(self._tables) else None
+
+    def _samples_of(self, timeout: float) -> int:
+        """Return the number of samples of a timeout [s]; an answer takes two of them."""
+        return max(2, whole_periods(timeout, self.period))
+
+    def _enter(self, cell: int, sample: int) -> None:
+        if self.state == ASKS:
+            self.state, self._near = STANDS, np.mean(self._turns[cell], axis=0)
+        self.place, self._cell = Place(True, cell, sample), np.array([cell, sample * self.period])
+
+    def _moves(self, time: float, measured: FloatArray, *, stopped: bool) -> bool:
+        """Whether the robot gives efforts in this sample, which it may begin anew now by an order."""
+        number, order = self._number, self._order
+        if not stopped or not self.place.known:
+            return self.state in MOVES
+        if order is not None and number >= order.sample:
+            self._order = None
+            if number == order.sample and self._still.full:
+                self._enter(order.cell, order.sample)
+                self._begin(order, time, measured)
+                return True
+        return False
+
+    def _begin(self, order: Begin, time: float, measured: FloatArray) -> None:
+        """Begin the cell of an order anew: set all states to rest, and choose the way.
+
+        From a rest outside the cell the robot returns to it, which no plan has proved free.
+        """
+        pose, joints = np.array(order.object_pose), self._still.mean()[: self._joints]
+        pose[2] += whole_turns(pose[2:], self._near[:1])[0]
+        axes, table = np.array([pose[2], *joints]), self._tables[order.cell]
+        way = self._way(order.cell, axes, pose[:2])
+        certified = self._holds(order.cell, axes, pose[:2]) and order.slow >= way
+        target = pose[:2] if certified else self._inside(order.cell, pose[:2])
+        middle = 0.5 * (table[:, GOAL_LOWER] + table[:, GOAL_UPPER])
+        ends = np.stack([axes, middle]), np.stack([pose[:2], target])
+        self._slow = SlowMotion(order.sample, order.slow, *ends)
+        self.state = FOLLOWS if certified else RETURNS
+        wait = self._plan.restart.wait if self._plan.restart else 0.0
+        self._stays_until = order.sample + order.slow + whole_periods(wait, self.period)
+        self._sampled.at(time, self._inputs(measured))
+        self._deployed.begin(self._sampled.context, order.cell, pose, joints)
+        self._said, self._reported, self._told_rest = Ready(order.cell, False), inf, -inf
+
+    def _holds(self, cell: int, axes: FloatArray, position: FloatArray) -> bool:
+        """Whether the plan states that a cell can be begun anew from a rest, see ``answers/restart.py``."""
+        restart = self._plan.restart
+        if restart is None or self._knowledge.cells[cell].clearance(position) < 0.0:
+            return False
+        table, departure = self._tables[cell], restart.departures[cell][self._axes]
+        inside = np.minimum(axes - table[:, SLICE_LOWER], table[:, SLICE_UPPER] - axes)
+        return bool((inside >= departure).all())
+
+    def _way(self, cell: int, axes: FloatArray, position: FloatArray) -> int:
+        """Return for how many samples the robot goes slowly from a rest."""
+        table, restart = self._tables[cell], self._plan.restart
+        way = np.abs(axes - 0.5 * (table[:, GOAL_LOWER] + table[:, GOAL_UPPER])).max()
+        way = max(float(way), float(np.hypot(*(self._inside(cell, position) - position))))
+        return slow_samples(way, self.period, restart.rate / RATE if restart else 1.0)
+
+    def _inside(self, cell: int, position: FloatArray, room: float = 0.0) -> FloatArray:
+        """Return the point of a governed region, less a strip, that is nearest to a position [m]."""
+        governed = self._plan.governed(cell)
+        if self._knowledge.cells[cell].clearance(position) >= room:
+            return position
+        region = next((part for part in (governed.buffer(-ROOM), governed) if not part.is_empty), governed)
+        nearest = nearest_points(region, Point(position))[0]
+        return np.array([nearest.x, nearest.y])
+
+    def _stand(self, measured: FloatArray) -> Said:
+        """Wait; say where the object rests once it does, and which cells the robot can begin from there."""
+        if self.state not in (STANDS, OUTSIDE):
+            self._still.restart()
+        self.state, self._slow = STANDS, None
+        rates, joints = measured[3 + self._joints : self._state_size], measured[3 : 3 + self._joints]
+        seen = np.concatenate([joints, measured[self._state_size :]])
+        if not self._still.sees_rest(rates, seen):
+            return []
+        mean, table = self._still.mean(), self._tables[self.place.cell]
+        axes, position = np.array([mean[-1], *mean[: self._joints]]), mean[-3:-1]
+        width = table[:, SLICE_UPPER] - table[:, SLICE_LOWER]
+        outside = np.maximum(table[:, SLICE_LOWER] - axes, axes - table[:, SLICE_UPPER])
+        back = float(np.hypot(*(self._inside(self.place.cell, position) - position)))
+        if (outside > WIDEST_RETURN * width).any() or back > LONGEST_RETURN:
+            self.state = OUTSIDE
+            return []
+        if self._number - self._told_rest < whole_periods(AGAIN, self.period):
+            return []
+        self._told_rest = self._number
+        near = [c for c in range(self.place.cell - 1, self.place.cell + 2) if 0 <= c < len(self._tables)]
+        cells = tuple(cell for cell in near if self._holds(cell, axes, position))
+        needed = max(self._way(cell, axes, position) for cell in {*cells, self.place.cell})
+        return [AtRest(self._number, cells, needed, tuple(float(part) for part in mean[-3:]))]
+
+    def _has_come(self, slow: SlowMotion, time: float) -> bool:
+        """Whether the slow way is over: from now on the cell's law acts, with funnels that are closed."""
+        if self._number < slow.begin + slow.samples:
+            return False
+        self._slow, self._cell[1] = None, time - closed_after(self._tables[self.place.cell])
+        return True
+
+    def _go_slowly(self, slow: SlowMotion, time: float, measured: FloatArray) -> FloatArray:
+        """Return the effort of a sample on the slow way."""
+        root, table, T = self._sampled.context, self._tables[self.place.cell], self.period
+        since, duration = (self._number - slow.begin) * T, slow.samples * T
+        # The clock of the funnels waits, and with it all that holds change.
+        self._cell, held = np.array([self.place.cell, time]), self._hold_message
+        released = {"hold_message": held * [0, 1]} if self._held else {}
+        self._sampled.at(time, self._inputs(measured) | released)
+        x, v = self._moving(root, measured)
+        lag = self._plan.budget.lag if self._plan.budget else 0.0
+        wanted, rate, _ = slow_motion(slow.axes, since, duration)
+        ahead = slow_motion(slow.axes, since + 0.5 * T + lag, duration)[2]
+        command = ahead - PULL[0] * (x - wanted) - PULL[1] * (v - rate)
+        own = [track_row(row, 0.0, *state)[0] for row, *state in zip(table, x, v, strict=True)]
+        self._deployed.command_axes(root, self.place.cell, command - own)
+        if self._monitored and self.state == FOLLOWS:
+            brakes = row_of(self._sampled, self._controller, ["alarm"])[0] >= BRAKES
+            self.state = STANDS if brakes else FOLLOWS
+        self._sampled.update()
+        self._deployed.keep_position(root, slow_motion(slow.position, since + T, duration)[0])
+        self.rest = self._rest()
+        return self._sampled.output("robot_effort")
+
+    def _moving(self, root: Context, measured: FloatArray) -> FloatArray:
+        """Return angle and joints, then their rates, nominal ones or as measured, shape (2, 1 + n)."""
+        nominal = self._deployed.nominal_axes(root)
+        if nominal is not None:
+            return nominal
+        n, rate = self._joints, self._sampled.output("object_state")[5]
+        joints, rates = measured[3 : 3 + n], measured[6 + n : 6 + 2 * n]
+        return np.array([[measured[-1], *joints], [rate, *rates]])
+
+    def _rest(self) -> FloatArray | None:
+        """Return where the robot's drives shall bring it if they brake now: where its nominal motion is.
+
+        Axes keep away from the ends of their slices, and the object from the boundary of its region, by as
+        much as a rest needs from which the cell can be begun anew.
+        """
+        root, restart, cell = self._sampled.context, self._plan.restart, int(self._cell[0])
+        axes, position = self._deployed.nominal_axes(root), self._deployed.nominal_position(root)
+        if axes is None or position is None or restart is None or self._knowledge.axis_motion is None:
+            return None
+        lower, upper = self._tables[cell][:, SLICE_LOWER], self._tables[cell][:, SLICE_UPPER]
+        inner = np.minimum(restart.departures[cell][self._axes] + ROOM, 0.5 * (upper - lower))
+        axes[0] = np.clip(axes[0], lower + inner, upper - inner)
+        away = self._inside(cell, position, ROOM)
+        position = away if np.hypot(*(away - position)) <= 3.0 * ROOM else position
+        state = np.zeros(self._state_size)
+        place_on_axes(axes, self._knowledge.axis_motion.mounting, state)
+        half, (c, s) = 3 + self._joints, (np.cos(axes[0, 0]), np.sin(axes[0, 0]))
+        hand = move_chain(self._chain, np.array([*state[:half], *np.zeros(half)]))[-1]
+        p_LE = self._knowledge.p_LE
+        state[0] = position[0] + c * p_LE[0] - s * p_LE[1] - hand[PX]
+        state[1] = position[1] + s * p_LE[0] + c * p_LE[1] - hand[PY]
+        return state[:half]
+
+    def _messages(self) -> Said:
+        """Return what is new: a report only where the supervisor would come to another conclusion by it.
+
+        A report of the present cell is retransmitted after a time without a new cell: it may be lost, or the
+        message of the new cell.
+        """
+        said: Said = []
+        index, margin = self._sampled.output("ready")
+        cell = int(self._cell[0])
+        stays = self._number < self._stays_until or self._doubted > 0
+        ready = index == cell and margin >= 0.0 and not stays
+        again = self._said.cell == cell and self._number - self._reported >= self._timeout
+        if again or ready != (self._said == Ready(cell, True)):
+            self._said, self._reported = Ready(cell, bool(ready)), self._number
+            said.append(self._said)
+        return said + self._requests()
+
+    def _requests(self) -> Said:
+        """Return the robot's request that the team be held, where the scenario has holds."""
+        asks, number = self._sampled.output("hold_request") if self._held else (0.0, -1.0)
+        return [HoldRequest(bool(asks > 0.0) or self._doubted > 0, int(number))] if number >= 0.0 else []
+
+    def release(self) -> None:
+        """Free all memory."""
+        self._sampled.release()
+
+
+class RobotProcess(NodeProcess):
+    """Answers the world for one robot.
+
+    In a session with the supervisor that begins while a run is under way, it first says which cell it is in,
+    until the supervisor answers with ``Switch``.
+
+    Args:
+        node: The robot.
+        ends: Its sockets, with sessions.
+        lock_step: Whether samples say how many messages of the supervisor count.
+    """
+
+    def __init__(self, node: RobotNode, ends: Ends, *, lock_step: bool = True) -> None:
+        super().__init__(ends, [SUPERVISOR], lock_step=lock_step)
+        self._node, self._team = node, ends.clients[SUPERVISOR]
+        self._placed, self._placing = 0, -inf
+        self._stepped: int | None = None
+        self._measured, self._stamps = np.zeros(0), (0.0, 0.0)
+
+    def _counts(self, question: Sample) -> Mapping[int, int]:
+        return {SUPERVISOR: question.team_messages}
+
+    def _hear(self, sender: int, message: Any) -> None:
+        if isinstance(message, Switch):
+            self._placed = self._team.sessions
+        self._node.hear([message])
+
+    def _begin(self, question: Sample) -> None:
+        if question.number == 0:
+            self._placed = self._team.sessions
+        else:
+            self._node.forget()
+
+    def _say_place(self) -> None:
+        """Say which cell this is, where the supervisor may not know, and not a moment ago."""
+        now = monotonic()
+        if self._placed == self._team.sessions or now - self._placing < AGAIN:
+            return
+        if self._ends.send(SUPERVISOR, self._node.place):
+            self._placing = now
+            self._node.meet()
+
+    def _answer(self, question: Sample) -> None:
+        number, time, node, ends = question.number, question.time, self._node, self._ends
+        measured = np.array([*question.robot_state, *question.object_pose])
+        ends.sample = number
+        self._say_place()
+        shown = tuple(node.look(node.instant(time, number) if question.step else time, measured).tolist())
+        if question.step:
+            effort, said = self._steps(question, measured)
+            for message in said:
+                ends.send(SUPERVISOR, message)
+            rest = () if node.rest is None else tuple(node.rest.tolist())
+            stamp, sent = min(question.pose_stamp, question.state_stamp), ends.sent(SUPERVISOR)
+            ends.send(WORLD, Effort(number, stamp, sent, node.state, tuple(effort.tolist()), rest))
+        # What the log shows comes last: then the world knows that there is no effort if none has come.
+        sent, refused = ends.sent(SUPERVISOR), ends.refusals.total
+        ends.send(WORLD, Telemetry(number, time, sent, node.state, refused, shown))
+        ends.release()
+
+    def _steps(self, question: Sample, measured: FloatArray) -> tuple[FloatArray, Said]:
+        """Compute a sample, and before it with the last measurements those of which nothing was heard."""
+        said: Said = []
+        missed = 0 if self._stepped is None or question.stopped else question.number - self._stepped - 1
+        for late in range(missed, 0, -1):
+            time, number = question.time - late * self._node.period, question.number - late
+            said += self._node.step(time, self._measured, sample=number, stamps=self._stamps)[1]
+        self._stepped, self._measured = question.number, measured
+        self._stamps = question.pose_stamp, question.state_stamp
+        effort, new = self._node.step(
+            question.time, measured, sample=question.number, stopped=question.stopped, stamps=self._stamps
+        )
+        return effort, said + new

@@ -1,0 +1,467 @@
+"""The world's exchange with all processes at every sample: in lock-step, or paced by the wall clock."""
+
+from __future__ import annotations
+
+import time as clocks
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from math import inf
+from typing import Any
+
+import numpy as np
+
+from coop_drake.apart import REJOIN
+from coop_drake.apart.membership import TOLERATED, Membership, Processes
+from coop_drake.apart.messages import (
+    SUPERVISOR,
+    Effort,
+    Reason,
+    RefusedError,
+    Sample,
+    Status,
+    Telemetry,
+    Tick,
+    Welcome,
+    name_of,
+)
+from coop_drake.apart.node import ASKS, FOLLOWS, MOVES, RETURNS, STATES, TURN, Stillness
+from coop_drake.apart.transport import Ends, Network
+from coop_drake.errors import MessagingError
+from coop_drake.laws.braking import Brake, braking_effort
+from coop_drake.tree.pose import FloatArray
+
+PATIENCE = 5.0
+"""How long a process may take for an answer in lock-step before the run goes on without it [s]."""
+
+_ROUNDING = 1e-6
+"""Differences of times that are no difference [s]."""
+
+_REHEARSALS = 20
+"""How often everybody is asked what it would log before the first sample by the wall clock [-]: the first
+answers of a process take several times as long as the later ones."""
+
+
+@dataclass(frozen=True)
+class Ages:
+    """Ages of what commands were computed from, when they came back to the world [s].
+
+    Attributes:
+        count: Number of commands.
+        median: Half of them are younger.
+        high: 99.9 % of them are younger.
+        largest: The oldest.
+        late: How many were older than is allowed.
+        allowed: Largest age that is allowed.
+        slipped: By how much the run took longer than its simulated time.
+    """
+
+    count: int
+    median: float
+    high: float
+    largest: float
+    late: int
+    allowed: float
+    slipped: float
+
+
+class Pacing:
+    """Lets samples begin no earlier than by the wall clock, and collects ages.
+
+    The world measures them by its own clock alone, from the question to the answer, so that clocks of other
+    machines do not matter.
+
+    Args:
+        allowed: Largest age that is allowed [s].
+    """
+
+    def __init__(self, allowed: float) -> None:
+        self.allowed, self._ages = allowed, list[float]()
+        self._start: float | None = None
+        self._slipped = 0.0
+
+    def wait(self, time: float) -> None:
+        """Wait until the wall clock has reached a simulated time [s]; a run that is late stays late."""
+        now = clocks.monotonic()
+        if self._start is None:
+            self._start = now - time
+        left = self._start + time - now
+        if left > 0.0:
+            clocks.sleep(left)
+        else:
+            self._start -= left
+            self._slipped -= left
+
+    def note(self, age: float) -> None:
+        """Note the age of a command [s]."""
+        self._ages.append(age)
+
+    def ages(self) -> Ages:
+        """Return what was measured."""
+        ages = np.array(self._ages or [0.0])
+        return Ages(
+            len(self._ages),
+            float(np.median(ages)),
+            float(np.quantile(ages, 0.999)),
+            float(ages.max()),
+            int((ages > self.allowed).sum()),
+            self.allowed,
+            self._slipped,
+        )
+
+
+def question(
+    index: int,
+    sample: int,
+    time: float,
+    measured: Sequence[FloatArray],
+    counts: Mapping[int, Any],
+    stamps: Sequence[FloatArray],
+    *,
+    step: bool,
+    stopped: bool,
+) -> Sample | Tick:
+    """Return what a process is asked at an instant.
+
+    Args:
+        index: Its index in messages.
+        sample: Number of the sample.
+        time: What its clock shows [s].
+        measured: What every robot measures: its own state, then the object's pose.
+        counts: How many messages each process has sent to the team, or the supervisor to each robot.
+        stamps: When every robot's pose and state were measured [s].
+        step: Whether it updates its state.
+        stopped: Whether the drives brake.
+    """
+    if index == SUPERVISOR:
+        sent = tuple(counts.get(k, 0) for k in range(len(measured)))
+        return Tick(sample, time, step, stopped, sent)
+    told, own = counts.get(SUPERVISOR), measured[index]
+    heard, (placed, moved) = told[index] if told else 0, stamps[index].tolist()
+    pose, state = tuple(own[-3:].tolist()), tuple(own[:-3].tolist())
+    return Sample(sample, time, step, stopped, heard, placed, moved, pose, state)
+
+
+def fits(sender: int, message: Any, sizes: Sequence[int], known: Mapping[tuple[int, type], Any]) -> bool:
+    """Whether the lists of an answer are as long as they must be, and its state is one.
+
+    Args:
+        sender: Who answers.
+        message: An ``Effort``, ``Telemetry`` or ``Status``.
+        sizes: Number of efforts of every robot.
+        known: The last answers.
+    """
+    if isinstance(message, Status):
+        return len(message.team_messages) == len(sizes) and len(message.causes) in (0, 1 + len(sizes))
+    if isinstance(message, Effort):
+        size = sizes[sender]
+        fitting = len(message.efforts) == size and len(message.rest) in (0, size)
+        return fitting and bool(message.state < len(STATES))
+    before = known.get((sender, Telemetry))
+    return (before is None or len(before.values) == len(message.values)) and bool(message.state < len(STATES))
+
+
+def process_facts(
+    index: int,
+    shown: Telemetry | Status | None,
+    *,
+    missing_since: float | None,
+    ended: bool,
+    state: int,
+    age: float | None,
+) -> dict[str, Any]:
+    """Return what a run reports about a process.
+
+    Args:
+        index: Its index in messages.
+        shown: What it has shown last.
+        missing_since: Since which simulated time it is missing [s].
+        ended: Whether a process that is missing is known to have ended.
+        state: The last state of a robot.
+        age: Age of what its last command was computed from, when it came to the world [s].
+    """
+    there, missing = "there" if index == SUPERVISOR else STATES[state], "gone" if ended else "silent"
+    return {
+        "name": name_of(index),
+        "state": there if missing_since is None else missing,
+        "missing_since": missing_since,
+        "team_messages": 0 if shown is None else int(np.sum(shown.team_messages)),
+        "refused": 0 if shown is None else shown.refused,
+        "age": age,
+    }
+
+
+class SampleExchange:
+    """Hands measurements over through sockets and waits for the answers.
+
+    A message of the team counts from the instant after the sample in which it was sent. Since the team's
+    channel is another one than that of the world, every answer says how many messages its sender has sent,
+    and the next question says how many its receiver must have received.
+
+    A process that is gone, or gives no answer for too long, is missing, see ``Membership``, until it answers
+    again. In lock-step nobody who is missing is asked before the team rests. Then the simulated time waits.
+    Who is there, but is not heard of because messages are lost, is asked on at every sample: the last message
+    of an answer, which no fault touches, says that there is no other.
+
+    The simulation first looks at an instant, for the log, and then takes the sample that is due there. Both
+    are one question: everybody shows what it would log before its update, then updates.
+
+    Args:
+        ends: The world's sockets, with sessions.
+        network: Robots, period of the samples, and faults of the robots' clocks.
+        pacing: Keeps the pace of the wall clock; None for lock-step, in which every sample waits.
+        tolerated: How long drives hold the last effort of a robot that gives no other [s].
+        oldest: Largest age that measurements on which an effort rests may have at its sample [s]; drives do
+            not take any other.
+        processes: Knows which processes have ended, and may start them again.
+        patience: How long a process may take for an answer in lock-step [s].
+        rejoin: How long a team at rest waits for who is missing [s], by the wall clock.
+        before: Called before every sample with its number.
+        tell: Is told what happens to processes.
+
+    Attributes:
+        sample: Number of the present sample.
+        membership: Who is missing, and whether the drives brake.
+        brakes: How the drives of each robot brake.
+    """
+
+    def __init__(
+        self,
+        ends: Ends,
+        network: Network,
+        *,
+        pacing: Pacing | None = None,
+        tolerated: float = TOLERATED,
+        oldest: float = inf,
+        processes: Processes | None = None,
+        patience: float = PATIENCE,
+        rejoin: float = REJOIN,
+        before: Callable[[int], None] = lambda sample: None,
+        tell: Callable[[str], None] = lambda words: None,
+    ) -> None:
+        self._ends, self._patience, self._before, self._pacing = ends, patience, before, pacing
+        self._everyone, self._period = [*range(len(network.book.robots)), SUPERVISOR], network.period
+        self._clock, self._oldest = network.faults.clock, oldest + _ROUNDING
+        self.membership = Membership(
+            tolerated=tolerated, rejoin=rejoin, processes=processes or Processes(), tell=tell
+        )
+        self.brakes: Sequence[Brake] = ()
+        self.sample, self._still = 0, Stillness(network.period)
+        self._last: dict[tuple[int, type], Any] = {}
+        self._states = dict[int, int]()
+        self._counts, self._rests = dict[int, Any](), dict[int, FloatArray]()
+        self._asked: dict[int, tuple[float, float]] = {}
+        self._sizes: list[int] = []
+        self._stamps: Sequence[FloatArray] = ()
+        self._answered, self._ages = dict[int, float](), dict[int, float]()
+        self._sampled, self._expected, self._unheard = -1, dict[int, tuple[int, float]](), set[int]()
+
+    @property
+    def missing(self) -> dict[int, float]:
+        """Since which simulated time each missing process is missing [s]."""
+        return self.membership.missing
+
+    def trouble(self) -> str:
+        """See ``Exchange``."""
+        return self.membership.trouble
+
+    def stopped(self) -> bool:
+        """See ``Exchange``."""
+        return self.membership.stopped or RETURNS in self._states.values()
+
+    def facts(self) -> dict[str, Any]:
+        """Return what a run reports about its processes: answers, messages of the team, ages of commands."""
+        processes = [
+            process_facts(
+                index,
+                self._last.get((index, Status if index == SUPERVISOR else Telemetry)),
+                missing_since=self.missing.get(index),
+                ended=self.membership.ended(index),
+                state=self._states.get(index, FOLLOWS),
+                age=self._ages.get(index),
+            )
+            for index in self._everyone
+        ]
+        ages = {} if self._pacing is None else {"command_ages": asdict(self._pacing.ages())}
+        refused = {why.name: n for why, n in self._ends.refusals.counts.items()}
+        return {"processes": processes, "refused": refused, **self.membership.facts(), **ages}
+
+    def step(
+        self, time: float, measured: Sequence[FloatArray], stamps: Sequence[FloatArray] | None = None
+    ) -> list[FloatArray]:
+        """See ``Exchange``."""
+        if self._sampled != self.sample:
+            self._take_sample(time, measured, stamps)
+        self.sample += 1
+        return [self._effort(k, own) for k, own in enumerate(measured)]
+
+    def look(
+        self, time: float, measured: Sequence[FloatArray], stamps: Sequence[FloatArray] | None = None
+    ) -> FloatArray:
+        """See ``Exchange``."""
+        if time == self.sample * self._period:
+            self._take_sample(time, measured, stamps)
+        elif not self.trouble():
+            self._stamps = [np.full(2, time) for _ in measured] if stamps is None else stamps
+            self._ask(time, measured, step=False)
+        needed = {(SUPERVISOR, Status), *((k, Telemetry) for k in self._everyone[:-1])}
+        if not needed <= self._last.keys():
+            self.membership.give_up()
+            raise MessagingError(self.trouble())
+        status = self._last[SUPERVISOR, Status]
+        shown = [self._last[k, Telemetry].values for k in self._everyone[:-1]]
+        return np.concatenate([*shown, [status.cell, status.entry, status.arrived, *status.causes]])
+
+    def _take_sample(
+        self, time: float, measured: Sequence[FloatArray], stamps: Sequence[FloatArray] | None
+    ) -> None:
+        """Let everybody compute once, which shows before the update what it would log."""
+        self._stamps = [np.full(2, time) for _ in measured] if stamps is None else stamps
+        self._before(self.sample)
+        if self._pacing is not None:
+            for _ in range(0 if self.sample else _REHEARSALS):
+                self._ask(time, measured, step=False)
+            self._pacing.wait(time)
+        self._sampled, membership = self.sample, self.membership
+        rests = self._still.sees_rest(np.concatenate([own[(len(own) - 3) // 2 : -3] for own in measured]))
+        membership.see(time, self._states, rests=rests)
+        robots = self.missing.keys() - {SUPERVISOR}
+        away = self.missing.keys() - self._unheard
+        if self._pacing is None and away and rests and (membership.stopped or not robots):
+            self._await(time, measured)
+        if not membership.trouble:
+            self._ask(time, measured, step=True)
+            self._close_line(time)
+
+    def _close_line(self, time: float) -> None:
+        """Let the drives go on where all robots have begun their cell at the present sample."""
+        efforts = [self._last.get((k, Effort)) for k in self._everyone[:-1]]
+        begun = all(e and e.number == self.sample and e.state in MOVES for e in efforts)
+        if self.membership.stopped and begun and not self.missing:
+            self.membership.close_line(time, certified=RETURNS not in self._states.values())
+
+    def _effort(self, robot: int, measured: FloatArray) -> FloatArray:
+        """Return what the drives of a robot do."""
+        if self.membership.stopped or (known := self._last.get((robot, Effort))) is None:
+            return braking_effort(measured[:-3], self.brakes[robot], self._rests.get(robot))
+        return np.array(known.efforts)
+
+    def _await(self, time: float, measured: Sequence[FloatArray]) -> None:
+        """Wait with the simulated time at rest until all are there and know the current cell, or time out."""
+        while not self.membership.timed_out():
+            if not self._ask(time, measured, step=False, waits_for_all=True):
+                for index in self.missing.keys() - self._unheard:
+                    self.membership.back(index)
+                return
+        self.membership.give_up()
+
+    def _ask(
+        self, time: float, measured: Sequence[FloatArray], *, step: bool, waits_for_all: bool = False
+    ) -> set[int]:
+        """Ask all who are there, and wait for their answers, which replace the last ones; return who is late.
+
+        Where the pace is that of the wall clock, those who are missing are asked, too, and not waited for.
+        """
+        everyone = waits_for_all or self._pacing is not None
+        away = self.missing.keys() - self._unheard
+        asked = [index for index in self._everyone if everyone or index not in away]
+        self._sizes = [(len(own) - 3) // 2 for own in measured]  # As many efforts as own coordinates.
+        self._asked[self.sample] = clocks.monotonic(), time
+        self._ends.sample = self.sample
+        flags = {"step": step, "stopped": self.membership.stopped}
+        asking = {
+            k: question(k, self.sample, self._clock(k, time), measured, self._counts, self._stamps, **flags)
+            for k in asked
+        }
+        self._expected = {k: (q.number, q.time) for k, q in asking.items() if self._ends.send(k, q)}
+        for index, late_ones in self._ends.release().items():
+            if late_ones:
+                self._expected.setdefault(index, max((late.number, late.time) for late in late_ones))
+        reached = self._expected.keys() | ({*asked} - self._ends.present())
+        waiting = {
+            (index, Status if index == SUPERVISOR else Telemetry)
+            for index in (asked if waits_for_all else reached - away)
+        }
+        deadline = clocks.monotonic() + (TURN if waits_for_all else self._limit())
+        while waiting and (left := deadline - clocks.monotonic()) > 0.0:
+            if (taken := self._ends.receive(min(TURN, left))) is not None:
+                waiting.discard(self._keep(*taken, admits=everyone))
+            elif not waits_for_all:
+                gone = {index for index, _ in waiting if self._has_gone(index)}
+                self._lose(gone)
+                waiting = {(index, wanted) for index, wanted in waiting if index not in gone}
+        late = {index for index, _ in waiting}
+        if not waits_for_all and (step or not self._pacing):  # Between samples nothing moves by an answer.
+            self._lose(self._quiet(late, time) if self._pacing else late - self.missing.keys())
+            if step:
+                self._unheard |= (quiet := self._quiet({*asked} - late, time))  # Who is there, but not heard.
+                self._lose(quiet)
+        return late
+
+    def _quiet(self, indices: set[int], time: float) -> set[int]:
+        """Return those that are not missing yet, and whose last efforts were held for too long."""
+        late = self.membership.too_long
+        return {k for k in indices - self.missing.keys() if late(self._since(k, time), time)}
+
+    def _limit(self) -> float:
+        """How long answers are waited for [s]: long before anything moves, longer while the drives brake."""
+        if self._pacing is None or self.sample == 0:
+            return self._patience
+        return max(self._pacing.allowed, TOLERATED if self.membership.stopped else 0.0)
+
+    def _since(self, index: int, time: float) -> float:
+        return self._answered.get(index, time if self._pacing else 0.0)
+
+    def _has_gone(self, index: int) -> bool:
+        """Whether a process has ended, or its connection is closed, which a sign of life shows."""
+        return self.membership.ended(index) or not self._ends.send(index, Welcome())
+
+    def _lose(self, indices: Any) -> None:
+        """Go on without processes; what they have sent to the team need not be waited for."""
+        lost = set(indices)
+        for index in lost:
+            self._counts.pop(index, None)
+        self.membership.lose({index: self._since(index, 0.0) for index in lost})
+
+    def _keep(self, sender: int, message: Any, *, admits: bool) -> tuple[int, type]:
+        """Keep an answer that is newer than the last; return who answered the present question, and how.
+
+        Args:
+            sender: Who answers.
+            message: The answer.
+            admits: Whether one who is missing may come back.
+        """
+        kind, nothing = type(message), (sender, type(None))
+        was_missing, unheard = sender in self.missing, sender in self._unheard
+        if not isinstance(message, Effort | Telemetry | Status) or (was_missing and not (admits or unheard)):
+            return nothing
+        if message.number > self.sample or not fits(sender, message, self._sizes, self._last):
+            self._ends.refusals.add(RefusedError(Reason.VALUE))
+            return nothing
+        asked, time = self._asked[message.number]
+        if isinstance(message, Effort) and not time - self._oldest <= message.stamp <= time + _ROUNDING:
+            self._ends.refusals.add(RefusedError(Reason.STAMP))
+            return nothing
+        expected = self._expected.get(sender, (self.sample, -inf))
+        present = (message.number, getattr(message, "time", inf)) >= expected
+        age = clocks.monotonic() - asked
+        if isinstance(message, Effort) and self._pacing is not None:
+            self._pacing.note(age)
+        if was_missing and not present and not (self._pacing and age <= self._pacing.allowed):
+            return nothing
+        self._counts[sender] = message.team_messages
+        if not isinstance(message, Status):
+            self._states[sender] = message.state
+        knows = message.knows if isinstance(message, Status) else message.state != ASKS
+        known = self._last.get((sender, kind))
+        if not knows:
+            return nothing
+        if known is None or message.number >= known.number:
+            self._last[sender, kind] = message
+            if kind is not Telemetry:
+                self._answered[sender], self._ages[sender] = time, age
+            if isinstance(message, Effort) and message.rest:
+                self._rests[sender] = np.array(message.rest)
+        if was_missing and kind is not Telemetry and (self._pacing is not None or unheard):
+            self._unheard.discard(sender)
+            self.membership.back(sender)
+        return (sender, kind) if present else nothing

@@ -1,0 +1,181 @@
+"""Every message goes to bytes and back bit for bit; whatever departs from its type is refused."""
+
+import math
+import struct
+from itertools import product
+
+import msgspec
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from msgspec.inspect import BoolType, FloatType, IntType, Metadata, StrType
+
+from coop_drake.apart.messages import (
+    LONGEST,
+    MOST_ITEMS,
+    PROTOCOL,
+    SUPERVISOR,
+    WORLD,
+    Effort,
+    Hello,
+    Ready,
+    Reason,
+    RefusedError,
+    Sample,
+    Telemetry,
+    decode,
+    decoder_of,
+    encode,
+    kinds_of,
+    protocol_of,
+)
+
+PAIRS = [(a, b) for a, b in product((0, SUPERVISOR, WORLD), repeat=2) if a != b]
+raw = msgspec.msgpack.encode
+
+SAMPLE = {
+    "type": "Sample", "number": 1, "time": 0.5, "step": True, "stopped": False, "team_messages": 0,
+    "pose_stamp": 0.5, "state_stamp": 0.5, "object_pose": [1.0, 2.0, 0.5], "robot_state": [0.0] * 8,
+}  # fmt: skip
+
+
+def values(kind):
+    if isinstance(kind, Metadata):
+        return values(kind.type)
+    if isinstance(kind, BoolType):
+        return st.booleans()
+    if isinstance(kind, IntType):
+        return st.integers(kind.ge, kind.le)
+    if isinstance(kind, FloatType):
+        return st.floats(allow_nan=kind.le is None, allow_infinity=kind.le is None)
+    if isinstance(kind, StrType):
+        return st.text(st.characters(min_codepoint=32, max_codepoint=126), max_size=kind.max_length)
+    return st.lists(values(kind.item_type), max_size=12).map(tuple)
+
+
+def messages(sender, receiver):
+    return st.sampled_from(kinds_of(sender, receiver)).flatmap(
+        lambda cls: st.builds(cls, *(values(field.type) for field in msgspec.inspect.type_info(cls).fields))
+    )
+
+
+sent_between = st.sampled_from(PAIRS).flatmap(lambda pair: st.tuples(st.just(pair), messages(*pair)))
+
+
+def refused(data, sender=WORLD, receiver=0):
+    with pytest.raises(RefusedError) as caught:
+        decode(data, decoder_of(sender, receiver))
+    assert caught.value.reason is Reason.MALFORMED
+    return caught.value.detail
+
+
+@given(sent_between, st.integers(0, 2**32 - 1), st.integers(0, 2**32 - 1))
+def test_every_message_comes_back_as_it_was_and_every_real_number_bit_for_bit(sent, session, number):
+    pair, message = sent
+    data = encode(session, number, message)
+    assert len(data) <= LONGEST
+    *head, back = decode(data, decoder_of(*pair))
+    assert (head, type(back)) == ([session, number], type(message))
+    assert encode(session, number, back) == data  # So that a nan comes back as the same nan, too.
+
+
+@given(sent_between, st.data())
+def test_bytes_that_are_cut_changed_or_random_raise_nothing_but_a_refusal(sent, data):
+    pair, message = sent
+    whole = bytearray(encode(1, 1, message))
+    cut = bytes(whole[: data.draw(st.integers(0, len(whole) - 1))])
+    refused(cut, *pair)
+    whole[data.draw(st.integers(0, len(whole) - 1))] ^= data.draw(st.integers(1, 255))
+    for other in (bytes(whole), data.draw(st.binary(max_size=80))):
+        try:
+            _, _, read = decode(other, decoder_of(*pair))
+        except RefusedError:
+            continue
+        assert isinstance(read, kinds_of(*pair))
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"time": math.nan}, "Expected `float` >= "),
+        ({"time": -math.inf}, "Expected `float` >= "),
+        ({"robot_state": [1.0, math.inf]}, r"at `$[2].robot_state[1]`"),
+        ({"time": "0.5"}, "Expected `float`, got `str`"),
+        ({"time": True}, "Expected `float`, got `bool`"),
+        ({"number": 1.0}, "Expected `int`, got `float`"),
+        ({"number": -1}, "Expected `int` >= 0"),
+        ({"number": 2**32}, "Expected `int` <= 4294967295"),
+        ({"step": 1}, "Expected `bool`, got `int`"),
+        ({"object_pose": None}, "Expected `array`, got `None`"),
+        ({"robot_state": [0.0] * (MOST_ITEMS + 1)}, "length <= 4096"),
+        ({"more": 1}, "unknown field `more`"),
+        ({"type": "Nothing"}, "Invalid value 'Nothing'"),
+        ({"type": "Tick"}, "Invalid value 'Tick'"),  # That of a supervisor.
+        ({"type": 16}, "Expected `str`, got `int`"),
+    ],
+)
+def test_a_field_of_another_type_or_beyond_its_limits_is_refused_and_named(change, words):
+    assert decode(raw([1, 1, SAMPLE]), decoder_of(WORLD, 0))[2].object_pose == (1.0, 2.0, 0.5)
+    assert words in refused(raw([1, 1, SAMPLE | change]))
+
+
+@pytest.mark.parametrize("field", SAMPLE)
+def test_a_missing_field_is_refused_and_named(field):
+    assert f"missing required field `{field}`" in refused(
+        raw([1, 1, {key: value for key, value in SAMPLE.items() if key != field}])
+    )
+
+
+HEAD, NESTED = b"\x93\x01\x01", b"\x91" * 50_000 + b"\x00"
+TYPE = raw("type") + raw("Sample")
+
+
+@pytest.mark.parametrize(
+    "data",
+    [
+        b"",
+        raw([1, 1]),
+        raw([1, 1, SAMPLE, 1]),
+        raw([1, 1, SAMPLE]) + b"\0",
+        raw({"type": "Sample"}),
+        NESTED,
+        b"\x93" + NESTED,
+        HEAD + b"\x82" + TYPE + raw("more") + NESTED,
+        HEAD + b"\x82" + raw("more") + NESTED + TYPE,
+        HEAD + b"\x82" + raw("more") + b"\x81\0" * 50_000 + b"\0" + TYPE,
+        HEAD + b"\x82" + TYPE + raw("robot_state") + b"\xdd\xff\xff\xff\xff",  # A list of 2^32 - 1 items.
+        HEAD + b"\xdf\xff\xff\xff\xff" + TYPE,
+        HEAD + b"\x82" + TYPE + b"\xa2\xff\xfe\0",  # A key that is no text.
+    ],
+)
+def test_another_form_a_bomb_or_a_length_that_is_not_there_is_refused(data):
+    refused(data)
+
+
+def test_whole_numbers_count_as_real_ones_and_short_reals_are_read():
+    whole = SAMPLE | {"time": 3, "object_pose": [1, 2, 2**64 - 1]}
+    assert decode(raw([1, 1, whole]), decoder_of(WORLD, 0))[2].object_pose == (1.0, 2.0, float(2**64 - 1))
+    short = raw([1, 1, SAMPLE]).replace(b"\xcb" + struct.pack(">d", 2.0), b"\xca" + struct.pack(">f", 2.0))
+    assert decode(short, decoder_of(WORLD, 0))[2].object_pose == (1.0, 2.0, 0.5)
+
+
+def test_what_only_the_log_shows_may_be_no_number_and_an_effort_may_not():
+    shown = Telemetry(1, 0.0, 0, 0, 0, (math.nan, math.inf))
+    assert math.isnan(decode(encode(1, 1, shown), decoder_of(0, WORLD))[2].values[0])
+    refused(encode(1, 1, Effort(1, 0.0, 0, 0, (math.nan,), ())), 0, WORLD)
+
+
+def test_who_may_send_what():
+    ready = encode(1, 1, Ready(1, True))
+    assert decode(ready, decoder_of(0, SUPERVISOR))[2] == Ready(1, True)
+    for pair in PAIRS:
+        if pair != (0, SUPERVISOR):
+            refused(ready, *pair)
+
+
+def test_a_hello_says_its_protocol_in_all_versions():
+    assert protocol_of(encode(7, 0, Hello(PROTOCOL, 0, "", ""))) == (7, PROTOCOL)
+    assert protocol_of(raw([7, 0, {"type": "Hello", "protocol": 9, "name": "left arm"}])) == (7, 9)
+    sample = Sample(1, 0.0, True, False, 0, 0.0, 0.0, (), ())
+    for other in (encode(7, 1, sample), b"\1\x0d\xcd\4\0", NESTED, raw([7, 0, {"type": "Hello"}])):
+        assert protocol_of(other) is None

@@ -1,0 +1,409 @@
+"""Robots and supervisor as processes: runs are those of one process, whatever goes wrong ends at rest."""
+
+import os
+import random
+import signal
+from dataclasses import replace
+from functools import cache
+
+import msgspec
+import numpy as np
+import pytest
+import zmq
+
+from coop_drake.apart import DirectExchange, LocalTeam, network_of, run_world, simulate_apart
+from coop_drake.apart.faults import NO_FAULTS, ChannelFaults, ClockFault, Faults, Gap
+from coop_drake.apart.messages import PROTOCOL, SUPERVISOR, WORLD, Effort, Hello, Ready, Switch, encode
+from coop_drake.apart.world import Pacing
+from coop_drake.diagram import build_world
+from coop_drake.errors import MessagingError, RefusalError
+from coop_drake.plant import planning_problem, run_setup
+from coop_drake.scenario import Control, Hold, Measurements, Messages
+from coop_drake.simulation import communication, run_loop, simulate
+from coop_drake.verification.runs import verify_log
+from tests.support.same_runs import differences
+from tests.support.sampled_team import sampled
+from tests.support.small_loop import small_maps
+
+pytestmark = pytest.mark.no_cover
+
+FAULT = 40
+"""Sample of a fault; the team is on its way."""
+
+
+def run(problem, acts=None, *, restarts=1, faults=NO_FAULTS, **options):
+    """Log, facts and words of a run in which something is done to the processes at samples."""
+    network, facts, told = network_of(*problem, faults=faults), {}, []
+    with LocalTeam(*problem, small_maps(), network, restarts=restarts) as team:
+
+        def before(sample):
+            if acts and sample in acts:
+                acts[sample](team)
+
+        log = run_world(
+            *problem,
+            network,
+            processes=team,
+            before=before,
+            report=facts.update,
+            tell=told.append,
+            **options,
+        )
+    return log, facts, told
+
+
+def kill(*indices):
+    def act(team):
+        for index in indices:
+            team.processes[index].kill()
+            team.processes[index].join()
+
+    return act
+
+
+def signalled(index, *numbers):
+    return lambda team: [os.kill(team.processes[index].pid, number) for number in numbers]
+
+
+def nothing_touched(log, by=0.0):
+    return min(log.workspace_clearance.min(), log.body_clearance.min()) > by
+
+
+def test_a_run_is_that_of_one_process_with_as_many_messages_of_the_team():
+    problem, direct = sampled("base"), DirectExchange()
+    counted = communication(simulate_apart(*problem, small_maps(), exchange=direct))
+    log, facts, _ = run(problem)
+    assert log.reached
+    assert differences(log, simulate(*problem, small_maps())) == []
+    sent = [process["team_messages"] for process in facts["processes"]]
+    assert sent == [*counted.reports, counted.announcements]
+    said = [2 if sender is None else 1 for _, sender, _ in direct.messages]
+    assert sum(said) == sum(sent) == counted.messages
+
+
+@pytest.mark.slow
+def test_a_held_team_of_three_with_noise_delay_and_losses_runs_as_in_one_process():
+    problem = sampled(
+        "three",
+        Control(hold=Hold(at=(0.3,), duration=0.3, silence=0.1)),
+        measurements=Measurements(1e-3, 5e-4, 1e-3, delay=0.01),
+        messages=Messages(loss=0.2),
+    )
+    together = simulate(*problem, small_maps())
+    assert together.reached
+    assert differences(together, run(problem)[0]) == []
+
+
+@pytest.mark.slow
+def test_the_pace_of_the_wall_clock_changes_nothing_where_nobody_is_late():
+    problem = sampled("base")
+    log, facts, _ = run(problem, pacing=Pacing(allowed=30.0))
+    assert differences(log, simulate(*problem, small_maps())) == []
+    ages = facts["command_ages"]
+    assert ages["count"] == 2 * (1 + round(log.times[-1] / 0.01))
+    assert 0.0 < ages["median"] <= ages["high"] <= ages["largest"] < 30.0
+    assert ages["late"] == 0
+    assert [process["state"] for process in facts["processes"]] == ["follows the plan"] * 2 + ["there"]
+    assert facts["refused"] == {}
+
+
+class OutsideWorld:
+    """A world that knows nothing but docs/reference/messages.md: bare sockets, plain lists and maps."""
+
+    def __init__(self, address, robots):
+        self._socket = zmq.Context.instance().socket(zmq.ROUTER)
+        self._socket.linger = 200
+        self._socket.bind(address)
+        self._robots, self._routes, self._numbers = robots, {}, {}
+        self._counts, self._sample, self._efforts = {}, 0, {}
+        while len(self._routes) <= robots:
+            self._hear()
+
+    def _send(self, index, fields, number=0):
+        route, session = self._routes[index]
+        self._socket.send_multipart([route, msgspec.msgpack.encode([session, number, fields])])
+
+    def _hear(self):
+        """Take in a message, with the name of its type and its sender."""
+        assert self._socket.poll(10_000)
+        route, data = self._socket.recv_multipart()
+        session, _, fields = msgspec.msgpack.decode(data)
+        if fields["type"] == "Hello":
+            assert fields["protocol"] == PROTOCOL
+            self._routes[fields["sender"]], self._numbers[fields["sender"]] = (route, session), 0
+            self._send(fields["sender"], {"type": "Welcome"})
+            return None, fields
+        return next(k for k, known in self._routes.items() if known[0] == route), fields
+
+    def _ask(self, time, measured, stamps, step):
+        for k in (*range(self._robots), SUPERVISOR):
+            fields = {"number": self._sample, "time": time, "step": step, "stopped": False}
+            if k == SUPERVISOR:
+                heard = [self._counts.get(robot, 0) for robot in range(self._robots)]
+                fields |= {"type": "Tick", "team_messages": heard}
+            else:
+                own, (pose, state) = measured[k].tolist(), stamps[k].tolist()
+                fields |= {"type": "Sample", "team_messages": self._counts.get(SUPERVISOR, {}).get(k, 0)}
+                fields |= {"pose_stamp": pose, "state_stamp": state}
+                fields |= {"object_pose": own[-3:], "robot_state": own[:-3]}
+            self._numbers[k] += 1
+            self._send(k, fields, self._numbers[k])
+        shown = {}
+        while len(shown) <= self._robots:
+            sender, fields = self._hear()
+            if fields["type"] == "Effort":
+                self._efforts[sender] = np.array(fields["efforts"])
+            elif fields["type"] != "Hello":
+                shown[sender] = fields
+        counts = {k: fields["team_messages"] for k, fields in shown.items()}
+        self._counts = counts | {SUPERVISOR: dict(enumerate(counts[SUPERVISOR]))}
+        status = shown.pop(SUPERVISOR)
+        ends = [status["cell"], status["entry"], status["arrived"], *status["causes"]]
+        return np.concatenate([*(shown[k]["values"] for k in range(self._robots)), ends])
+
+    def look(self, time, measured, stamps=None):
+        stamps = [np.full(2, time)] * self._robots if stamps is None else stamps
+        if time != self._sample * 0.01:
+            return self._ask(time, measured, stamps, step=False)
+        self._shown = self._ask(time, measured, stamps, step=True)
+        return self._shown
+
+    def step(self, time, measured, stamps=None):
+        self._sample += 1
+        return [self._efforts[k] for k in range(self._robots)]
+
+    def trouble(self):
+        return ""
+
+    def stopped(self):
+        return False
+
+    def close(self):
+        for k in self._routes:
+            self._send(k, {"type": "Goodbye", "outcome": 0})
+        self._socket.close()
+
+
+@pytest.mark.slow
+def test_a_world_that_is_built_by_the_page_of_messages_runs_the_team_as_ours_does():
+    problem = sampled("base")
+    network = network_of(*problem)
+    with LocalTeam(*problem, small_maps(), network) as team:
+        outside = OutsideWorld(network.book.world.address, 2)
+        world = build_world(*problem, outside)
+        try:
+            log = run_loop(world, problem[0])
+        finally:
+            outside.close()
+            world.release()
+        for process in team.processes.values():
+            process.join(5.0)
+        assert [process.exitcode for process in team.processes.values()] == [0, 0, 0]
+    assert log.reached
+    assert differences(log, simulate(*problem, small_maps())) == []
+
+
+class Hostile:
+    """Sends to every port of a team what it must refuse."""
+
+    def __init__(self, book):
+        self._context, self._dice, self._sockets = zmq.Context(), random.Random(1), []
+        for address in (book.world.address, book.supervisor.address):
+            for kind in (zmq.DEALER, zmq.REQ, zmq.PUSH):
+                socket = self._context.socket(kind)
+                socket.linger = 0
+                socket.connect(address)
+                self._sockets.append(socket)
+
+    def act(self, sample):
+        """Send twenty messages of all kinds on each connection that takes them."""
+        session, number = self._dice.getrandbits(32), sample + 2
+        forged = [
+            encode(session, number, Effort(sample, 0.01 * sample, 9, 0, (1e6,) * 5, ())),
+            encode(session, number, Ready(0, ready=True)),
+            encode(session, number, Switch(1, sample)),
+            encode(session, 0, Hello(PROTOCOL, 0, "", "")),
+            encode(session, 0, Hello(PROTOCOL, WORLD, "", "")),
+            encode(session, 0, Hello(PROTOCOL - 1, 1, "", "")),
+        ]
+        noise = [self._dice.randbytes(self._dice.randrange(200)) for _ in range(14)]
+        for socket in self._sockets:
+            for data in forged + noise:
+                try:
+                    socket.send(data, zmq.NOBLOCK)
+                except zmq.ZMQError:  # It is full, or waits for an answer that never comes.
+                    break
+
+    def close(self):
+        for socket in self._sockets:
+            socket.close()
+        self._context.term()
+
+
+@pytest.mark.slow
+def test_the_log_beside_one_who_floods_forges_and_sends_random_bytes_is_that_of_an_undisturbed_run():
+    problem = sampled("base")
+    network = network_of(*problem)
+    hostile = Hostile(network.book)
+    try:
+        with LocalTeam(*problem, small_maps(), network) as team:
+            log = run_world(*problem, network, processes=team, before=hostile.act)
+    finally:
+        hostile.close()
+    assert log.reached
+    assert differences(simulate(*problem, small_maps()), log) == []
+
+
+@pytest.mark.slow
+def test_who_has_another_plan_or_is_missing_at_the_start_is_named(capfd):
+    scenario, plan = sampled("base")
+    network, other = network_of(scenario, plan), replace(plan, gain_set="another")
+    others = replace(network_of(scenario, other), book=network.book)
+    with (
+        LocalTeam(scenario, other, small_maps(), others),
+        pytest.raises(MessagingError, match="robot 0, robot 1, the supervisor"),
+    ):
+        run_world(scenario, plan, network, opening=2.0)
+    with LocalTeam(scenario, plan, small_maps(), network) as team:
+        kill(1)(team)
+        with pytest.raises(MessagingError, match="robot 1 ended before the start"):
+            run_world(scenario, plan, network, processes=team)
+    assert all(process.exitcode is not None for process in team.processes.values())
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("name", "act", "missing"),
+    [
+        ("base", signalled(0, signal.SIGSTOP), "robot 0"),
+        ("three", kill(2), "robot 2"),
+        ("base", kill(SUPERVISOR), "the supervisor"),
+    ],
+)
+def test_a_team_without_one_process_rests_without_contact(name, act, missing):
+    log, _, _ = run(sampled(name), {FAULT: act}, restarts=0, patience=1.0, rejoin=0.0)
+    assert not log.reached
+    assert log.violation.startswith(f"{missing} has not answered since t = 0.39 s; the team rests since t = ")
+    assert nothing_touched(log)
+    assert np.abs(log.joint_rates[-1]).max() < 0.02
+    if missing == "the supervisor":  # No drive brakes: the robots bring the object to rest in its cell.
+        assert log.cell_index[-1] == log.cell_index[log.times <= 0.4][-1]
+        assert min(log.funnel_margin.min(), log.cell_clearance.min()) > 0.0
+
+
+@pytest.mark.slow
+def test_a_process_that_goes_on_in_time_changes_nothing():
+    log, facts, _ = run(sampled("base"), {FAULT: signalled(1, signal.SIGSTOP, signal.SIGCONT)})
+    assert log.reached
+    assert facts["stops"] == []
+
+
+@pytest.mark.slow
+def test_a_robot_that_is_late_for_too_long_stops_a_paced_team():
+    acts = {FAULT: signalled(1, signal.SIGSTOP)}
+    log, facts, _ = run(sampled("base"), acts, pacing=Pacing(allowed=1.0), rejoin=0.0)
+    assert log.violation.startswith("robot 1 has not answered since t = 0.39 s; the team rests")
+    assert facts["processes"][1]["state"] == "silent"
+    assert facts["processes"][1]["missing_since"] == pytest.approx(0.39)
+
+
+@pytest.mark.slow
+def test_a_robot_that_is_killed_and_started_again_rejoins_and_the_team_arrives():
+    problem = sampled("base")
+    log, facts, told = run(problem, {FAULT: kill(1)})
+    assert log.reached
+    assert not log.violation
+    assert nothing_touched(log, 0.05)
+    assert facts["restarts"] == {"robot 1": 1}
+    (stop,) = facts["stops"]
+    assert (stop["cause"], stop["since"]) == ("robot 1", pytest.approx(0.42))
+    assert stop["since"] < stop["rested"] < stop["resumed"] < log.times[-1]
+    assert told[0] == "robot 1 has not answered since t = 0.39 s; it is started again"
+    waits = (log.times > stop["rested"]) & (log.times < stop["resumed"])
+    assert np.abs(log.object_twist[waits]).max() < 0.03
+    after = log.times > stop["resumed"] + 1.0
+    assert min(log.slice_margin[after].min(), log.funnel_margin[after].min()) > 0.0
+    assert log.cell_clearance.min() > 0.0
+    assert log.governor_spread[after].max() < 1e-9
+    against = problem[1], planning_problem(problem[0]), run_setup(problem[0])
+    verified = verify_log(log, *against, braked=True)
+    assert verified.proved == "in this run nothing touched, between the rows, too"
+    assert verified.not_proved.startswith("that the team followed the plan")
+    with pytest.raises(RefusalError, match=r"cell|slice|funnel|interval"):
+        verify_log(log, *against)
+    moved = log.object_pose + [0.01, 0.0, 0.0] * (log.times > 1.0)[:, None]
+    with pytest.raises(RefusalError, match=r"object_pose|object_twist|base_poses"):
+        verify_log(replace(log, object_pose=moved), *against, braked=True)
+
+
+@pytest.mark.slow
+def test_a_supervisor_that_is_killed_and_started_again_learns_the_cell_and_nothing_else_changes():
+    problem = sampled("base")
+    log, facts, _ = run(problem, {FAULT: kill(SUPERVISOR)})
+    assert log.reached
+    assert facts["restarts"] == {"the supervisor": 1}
+    assert facts["stops"] == []
+    assert min(log.funnel_margin.min(), log.slice_margin.min(), log.cell_clearance.min()) > 0.0
+    assert set(log.cell_index) == set(simulate(*problem, small_maps()).cell_index)
+
+
+@pytest.mark.slow
+def test_a_robot_and_the_supervisor_that_are_killed_together_rejoin():
+    log, facts, _ = run(sampled("three"), {FAULT: kill(2, SUPERVISOR)})
+    assert log.reached
+    assert nothing_touched(log, 0.05)
+    assert facts["restarts"] == {"robot 2": 1, "the supervisor": 1}
+
+
+@pytest.mark.slow
+def test_a_paced_team_holds_while_a_robot_stands_still_and_goes_on_after_it():
+    acts = {FAULT: signalled(1, signal.SIGSTOP), FAULT + 50: signalled(1, signal.SIGCONT)}
+    log, facts, told = run(sampled("base"), acts, pacing=Pacing(allowed=0.3))
+    assert log.reached
+    assert nothing_touched(log, 0.05)
+    assert facts["restarts"] == {}
+    assert [stop["cause"] for stop in facts["stops"]] == ["robot 1"]
+    assert "robot 1 is there again" in told
+
+
+AWAY, ONE_AWAY = Gap(0.4, 0.3), ChannelFaults(gaps=(Gap(0.4, 0.3, (1,)),))
+BAD = ChannelFaults(loss=0.2, repeat=0.2, late=0.2, late_by=0.03)
+POOR = ChannelFaults(loss=0.02, repeat=0.05, late=0.03, late_by=0.02)
+CLOCKS = (ClockFault(0, -0.01, -1e-3), ClockFault(1, 0.02, 1e-3))
+CASES = {
+    "the team's messages": ("three", Faults(seed=1, team=BAD), 0),
+    "measurements and efforts": ("base", Faults(seed=4, sensors=POOR, efforts=POOR), 0),
+    "no messages of the team for a while": ("base", Faults(team=ChannelFaults(gaps=(AWAY,))), 0),
+    "the world's stream is interrupted": ("base", Faults(sensors=ChannelFaults(gaps=(AWAY,))), 1),
+    "one robot's efforts are interrupted": ("base", Faults(efforts=ONE_AWAY), 1),
+    "all by the wall clock": ("base", Faults(seed=1, team=BAD, sensors=ONE_AWAY, efforts=POOR), 1),
+    "clocks apart, and a robot hears nothing": ("elbow", Faults(clocks=CLOCKS, sensors=ONE_AWAY), 1),
+}
+
+
+def run_case(case):
+    team, faults, _ = CASES[case]
+    pacing = Pacing(allowed=1.0) if "wall clock" in case else None
+    return run(sampled(team), faults=faults, pacing=pacing)
+
+
+kept = cache(run_case)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("case", CASES)
+def test_a_team_goes_on_or_waits_at_rest_and_arrives_without_contact(case):
+    log, facts, _ = kept(case)
+    assert log.reached
+    assert not log.violation
+    assert nothing_touched(log)
+    assert len(facts["stops"]) == CASES[case][2]
+    assert all(stop["since"] < stop["rested"] < stop["resumed"] for stop in facts["stops"])
+
+
+@pytest.mark.slow
+def test_the_same_faults_give_the_same_run():
+    first, facts, _ = kept("measurements and efforts")
+    assert differences(first, run_case("measurements and efforts")[0]) == []
+    assert facts["refused"].keys() == {"SEQUENCE"}
+    assert min(process["refused"] for process in facts["processes"]) > 0
