@@ -26,7 +26,6 @@ WITHOUT_DRAKE = [
     "diagnosis",
     "watching",
     "floor_plans",
-    "messages",
 ]
 
 
