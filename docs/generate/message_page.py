@@ -156,8 +156,8 @@ def _reasons() -> str:
     lines = [
         "## What is refused",
         "",
-        "A message that departs from this page is refused and counted under one of these reasons. The process\n"
-        "says on standard error what is wrong with the first malformed one.",
+        "A message that departs from this page is refused and counted under one of these reasons. The\n"
+        "process says on standard error what is wrong with the first malformed one.",
         "",
         *(f"- **{reason.name.lower()}**: {reason.value}" for reason in Reason),
         "",

@@ -108,7 +108,7 @@ def test_the_pace_of_the_wall_clock_changes_nothing_where_nobody_is_late():
 
 
 class OutsideWorld:
-    """A world that knows nothing but docs/reference/messages.md and the fields: bare sockets, plain lists and maps."""
+    """A world that knows nothing but docs/reference/messages.md and the fields: bare sockets, lists, maps."""
 
     def __init__(self, address, robots):
         self._socket = zmq.Context.instance().socket(zmq.ROUTER)
