@@ -76,5 +76,5 @@ def test_the_picture_of_contributing_has_every_package_and_nothing_else():
     (picture,) = re.findall(r"```text\n(.*?)```", text, re.DOTALL)
     packages = {path.parent.name for way in ("*", "*/*") for path in HOUSE.glob(f"{way}/__init__.py")}
     assert set(re.findall(r"(\w+)/", picture)) == packages
-    for path in re.findall(r"^\| [^|`]+ \| `([\w/]+\.py)` \|", text, flags=re.MULTILINE):
+    for path in re.findall(r"^- [^`]+: `([\w/]+\.py)`$", text, flags=re.MULTILINE):
         assert (HOUSE / path).is_file()

@@ -33,9 +33,9 @@ def test_every_erratum_named_in_the_code_is_in_the_table():
     assert len(named) > 5
 
 
-def test_every_equation_of_the_paper_has_a_row():
+def test_every_equation_of_the_paper_is_listed():
     covered = set()
-    for row in re.findall(r"^\| ([^|]+) \|", EQUATIONS, re.MULTILINE):
+    for row in re.findall(r"^- ([^:]+):", EQUATIONS, re.MULTILINE):
         for first, last in re.findall(r"\((\d+)\)(?:–\((\d+)\))?", row):
             covered |= set(range(int(first), int(last or first) + 1))
     assert covered == set(range(1, 50))
