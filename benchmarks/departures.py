@@ -161,7 +161,7 @@ def departure_tasks() -> list[Task]:
 def deployment_of(data: Mapping[str, Any]) -> Deployment:
     """Return a deployment from data as in a scenario file, at 200 Hz unless it says otherwise."""
     own = {} if "preset" in data else _RATE
-    return convert_class(Deployment.completed({**own, **data}, "deployment"), Deployment)
+    return convert_class(Deployment.completed({**own, **data}), Deployment)
 
 
 def departing(team: str, deployment: Deployment, control: Control, *, known: bool = True) -> SimulationLog:

@@ -9,10 +9,10 @@ from __future__ import annotations
 import dataclasses
 import json
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass
 from math import isnan
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 from benchmarks.questions.answering import QuestionRecord, question_batches
 from benchmarks.questions.settings import QuestionSettings
@@ -42,7 +42,8 @@ from coop_drake.cli.reporter import ExitCode, Reporter
 from coop_drake.errors import ScenarioError
 from coop_drake.files import write_atomically
 from coop_drake.progress import Progress
-from coop_drake.scenario.reading import read_file
+from coop_drake.scenario.document import read_file
+from coop_drake.typed_data import HIDDEN
 
 NAMES = {"planner": "question", "search": "search", "breaking": "bisection"}
 """What the batches of a study consist of, by their tiers."""
@@ -62,7 +63,7 @@ class Study:
     questions: QuestionSettings | None = None
     searches: Searches | None = None
     breaking: Breaking | None = None
-    path: Path = field(default=Path("study.yaml"), metadata={"in_file": False})
+    path: Annotated[Path, HIDDEN] = Path("study.yaml")
 
     @property
     def name(self) -> str:

@@ -4,9 +4,17 @@ from __future__ import annotations
 
 import pickle
 import traceback
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from coop_drake.typed_data import DataError
 
 _LONGEST_VALUE = 200
 """Characters of a value that a message shows; a whole section of a file would fill the screen."""
+
+_MOST_FAULTS = 20
+"""Faults of a file that a message lists."""
 
 
 def shortened(value: object) -> str:
@@ -41,20 +49,34 @@ class ScenarioError(CoopDrakeError):
         key: Dotted path of the key inside the file, for example ``workspace.outer[3]``.
         value: The offending value as it stands in the file.
         allowed: What may stand there, for example ``a ring that does not cross itself``.
+        others: What else is wrong in the file, each as (key, value, allowed).
     """
 
-    def __init__(self, file: str, key: str, value: object, allowed: str) -> None:
-        self.file, self.key, self.value, self.allowed = file, key, value, allowed
-        super().__init__(f"{file}: {key}: {self.shown} is not allowed; expected {allowed}")
+    def __init__(
+        self, file: str, key: str, value: object, allowed: str, others: Sequence[tuple[str, object, str]] = ()
+    ) -> None:
+        self.file, self.key, self.value, self.allowed, self.others = file, key, value, allowed, tuple(others)
+        lines = [
+            f"{file}: {place}: {shortened(found)} is not allowed; expected {wanted}"
+            for place, found, wanted in ((key, value, allowed), *self.others[: _MOST_FAULTS - 1])
+        ]
+        more = len(self.others) + 1 - _MOST_FAULTS
+        super().__init__("\n".join(lines + [f"{file}: and {more} more"] * (more > 0)))
+
+    @classmethod
+    def of(cls, file: str, faults: Iterable[DataError]) -> ScenarioError:
+        """Return the error of a file with one or more faults."""
+        first, *others = ((one.key or "the file", one.value, one.allowed) for one in faults)
+        return cls(file, *first, others)
 
     @property
     def shown(self) -> str:
         """The offending value as text, shortened if it is long."""
         return shortened(self.value)
 
-    def __reduce__(self) -> tuple[type[ScenarioError], tuple[str, str, object, str]]:
+    def __reduce__(self) -> tuple[type[ScenarioError], tuple[object, ...]]:
         """Pickle the data instead of the message, so that the error can come from another process."""
-        return type(self), (self.file, self.key, self.value, self.allowed)
+        return type(self), (self.file, self.key, self.value, self.allowed, self.others)
 
 
 class FloorPlanError(CoopDrakeError):

@@ -21,8 +21,7 @@ from coop_drake.jit import compiled
 from coop_drake.planning.sampling.collision import bodies_apart, grid_for_team, is_free
 from coop_drake.plant import planning_problem
 from coop_drake.scenario import Goal, ObjectPose, Scenario, Start, Workspace, dump_scenario, load_scenario
-from coop_drake.scenario.directive import DirectiveEntry
-from coop_drake.scenario.limits import RobotLimits
+from coop_drake.scenario.model import DirectiveEntry, RobotLimits
 from coop_drake.tree.component_tree import ComponentTree
 from coop_drake.tree.levers import axis_levers
 from coop_drake.tree.pose import FloatArray
@@ -242,7 +241,7 @@ def _stated(team: RandomTeam, floor: Polygon, start: FloatArray, goal: Goal, pat
     ]
     return Scenario(
         Workspace(rings[0], tuple(rings[1:])),
-        tuple(DirectiveEntry(data, f"directives[{k}]") for k, data in enumerate(directives)),
+        tuple(map(DirectiveEntry, directives)),
         Start(ObjectPose(*start[:3].tolist()), _joints(team, start)),
         goal,
         limits=_LIMITS,

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from coop_drake.answers.budget import Budget
-from coop_drake.scenario.measured_bounds import wave_bounds
-from coop_drake.scenario.waves import Wave, Waves
+from coop_drake.scenario.budget_file import wave_bounds
+from coop_drake.scenario.deployment import Wave, Waves
 from coop_drake.tree import ComponentTree
 from coop_drake.tree.pose import FloatArray
 

@@ -1,8 +1,6 @@
 """Regions in files: the rings of a polygon, without their closing corners."""
 
 from dataclasses import dataclass
-from functools import partial
-from itertools import chain
 from typing import Annotated
 
 import numpy as np
@@ -11,32 +9,29 @@ from shapely import Polygon
 
 from coop_drake.geometry.parts import corners_of
 from coop_drake.tree.pose import FloatArray
-from coop_drake.typed_data import Codec, DataError, Number, convert, convert_class
+from coop_drake.typed_data import Codec, DataError, Number
+
+Pairs = tuple[tuple[Number, Number], ...]
 
 
-def _read_points(value: object, key: str, *, least: int) -> FloatArray:
-    """Read a list of points, shape (n, 2) [m]."""
-    if _holds_pairs(value):
-        points = np.array(value, dtype=np.float64)
-        if len(points) >= least and np.isfinite(points).all():
-            return points
-    convert(value, tuple[tuple[Number, Number], ...], key)  # This is slower; it names the wrong entry.
-    raise DataError(key, value, f"a list of at least {least} {'corners' if least > 2 else 'points'}")
+def _of_points(least: int) -> Codec:
+    """Return the codec of a list of points, shape (n, 2) [m]."""
+
+    def read(pairs: Pairs) -> FloatArray:
+        if len(pairs) < least:
+            allowed = f"a list of at least {least} {'corners' if least > 2 else 'points'}"
+            raise DataError("", [list(pair) for pair in pairs], allowed)
+        return np.array(pairs, dtype=np.float64)
+
+    return Codec(Pairs, read, np.ndarray.tolist)
 
 
-def _holds_pairs(value: object) -> bool:
-    """Whether a value is a list of pairs of numbers; numpy would take texts and truth values for numbers."""
-    if not isinstance(value, list) or set(map(type, value)) != {list} or set(map(len, value)) != {2}:
-        return False
-    return set(map(type, chain.from_iterable(value))) <= {int, float}
+Ring = Annotated[FloatArray, _of_points(3)]
 
-
-Ring = Annotated[FloatArray, Codec(partial(_read_points, least=3), np.ndarray.tolist)]
-
-Corners = Annotated[FloatArray, Codec(partial(_read_points, least=1), np.ndarray.tolist)]
+Corners = Annotated[FloatArray, _of_points(1)]
 """Corners of a convex polygon, or a single point [m]."""
 
-Points = Annotated[FloatArray, Codec(partial(_read_points, least=2), np.ndarray.tolist)]
+Points = Annotated[FloatArray, _of_points(2)]
 """A polyline that a file holds as the list of its points [m]."""
 
 
@@ -53,13 +48,12 @@ class Rings:
     holes: tuple[Ring, ...]
 
 
-def _read_region(value: object, key: str) -> Polygon:
-    rings = convert_class(value, Rings, key)
+def _read_region(rings: Rings) -> Polygon:
     polygon = Polygon(rings.outer, rings.holes)
     if not polygon.is_valid or polygon.area <= 0.0:
         reason = shapely.is_valid_reason(polygon)
         allowed = f"rings that cross neither themselves nor each other, but found: {reason}"
-        raise DataError(key, value, allowed)
+        raise DataError("", _write_region(polygon), allowed)
     return polygon
 
 
@@ -68,5 +62,5 @@ def _write_region(polygon: Polygon) -> object:
     return {"outer": outer, "holes": holes}
 
 
-Region = Annotated[Polygon, Codec(_read_region, _write_region)]
+Region = Annotated[Polygon, Codec(Rings, _read_region, _write_region)]
 """A polygon that a file holds as its rings [m]."""

@@ -20,7 +20,7 @@ from coop_drake.apart.messages import (
 from coop_drake.errors import ScenarioError
 from coop_drake.laws.sampling import whole_periods
 from coop_drake.scenario.deployment import Delay, Probability
-from coop_drake.scenario.reading import read_file
+from coop_drake.scenario.document import read_file
 from coop_drake.typed_data import Limits, NotNegative, Positive
 
 Robot = Annotated[int, Limits(at_least=0, at_most=MOST_ROBOTS - 1)]

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import numpy as np
 
-from coop_drake.typed_data import DataError, Limits, NotNegative
+from coop_drake.typed_data import TAGGED, DataError, Limits, NotNegative, Real
 
 _BETWEEN = 0.3819660112501051
 """Where in an interval a number is tried for a key [-]: at no simple fraction of it."""
@@ -21,7 +21,7 @@ class Deterministic:
         value: The number, in the unit of the key.
     """
 
-    value: float
+    value: Real
 
     def draw(self, generator: np.random.Generator) -> float:
         """Return the number."""
@@ -41,8 +41,8 @@ class Uniform:
         max: Largest number; it is itself never drawn unless it is the smallest, too.
     """
 
-    min: float
-    max: float
+    min: Real
+    max: Real
 
     def __post_init__(self) -> None:
         if self.max < self.min:
@@ -66,7 +66,7 @@ class Gaussian:
         stddev: Standard deviation.
     """
 
-    mean: float
+    mean: Real
     stddev: NotNegative
 
     def draw(self, generator: np.random.Generator) -> float:
@@ -86,7 +86,7 @@ class UniformDiscrete:
         values: The numbers, in the unit of the key.
     """
 
-    values: tuple[float, ...]
+    values: tuple[Real, ...]
 
     def __post_init__(self) -> None:
         if not self.values:
@@ -101,7 +101,7 @@ class UniformDiscrete:
         return self.values
 
 
-Distribution = Deterministic | Uniform | Gaussian | UniformDiscrete
+Distribution = Annotated[Deterministic | Uniform | Gaussian | UniformDiscrete, TAGGED]
 """What a varied key is drawn from, by its tag."""
 
 Count = Annotated[int, Limits(at_least=1)]

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Annotated, Any
 
-from coop_drake.typed_data import EXACT, Codec, DataError, Limits
+from coop_drake.typed_data import EXACT, DataError, Limits
 
-Plain = Annotated[Any, Codec(lambda value, key: value, lambda value: value)]
+Plain = Any
 """A value as it would stand in a scenario file; the scenario's own key says what is allowed."""
 
 LARGEST_SEED = 2**32 - 1

@@ -9,8 +9,8 @@ from typing import Annotated, Any, Literal
 
 from coop_drake.campaign.distributions import Count, Distribution
 from coop_drake.campaign.keys import Plain, Seed, check_keys
-from coop_drake.scenario.reading import read_file
-from coop_drake.typed_data import DataError, Limits, Positive
+from coop_drake.scenario.document import read_file
+from coop_drake.typed_data import HIDDEN, DataError, Limits, Positive
 
 Tier = Literal["drake", "compiled"]
 """Which loop a run is made by."""
@@ -83,10 +83,10 @@ class Campaign:
     """
 
     runs: Runs
-    path: Path = field(default=Path("campaign.yaml"), metadata={"in_file": False})
+    path: Annotated[Path, HIDDEN] = Path("campaign.yaml")
 
     @staticmethod
-    def completed(content: dict[str, Any], key: str) -> dict[str, Any]:
+    def completed(content: dict[str, Any]) -> dict[str, Any]:
         """Refuse sections of studies by the command that knows them.
 
         Raises:

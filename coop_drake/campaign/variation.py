@@ -19,11 +19,10 @@ from coop_drake.campaign.keys import SEED_KEY
 from coop_drake.campaign.settings import Campaign, Runs, Tier
 from coop_drake.errors import ScenarioError
 from coop_drake.scenario.budget_file import names_file
+from coop_drake.scenario.checks import validate
 from coop_drake.scenario.document import parse
-from coop_drake.scenario.floor import with_floor
-from coop_drake.scenario.load import load_scenario
+from coop_drake.scenario.load import load_scenario, with_floor
 from coop_drake.scenario.model import Scenario
-from coop_drake.scenario.validation import validate
 from coop_drake.shipped import scenario_file
 from coop_drake.typed_data import DataError, convert, field_types
 

@@ -53,7 +53,7 @@ def read_task(path: Path, gains: str | None = None, reporter: Reporter | None = 
     """
     from coop_drake.plant import joint_notes, planning_problem
     from coop_drake.scenario import load_scenario
-    from coop_drake.scenario.gain_file import with_gains
+    from coop_drake.scenario.load import with_gains
 
     scenario = with_gains(load_scenario(path), gains)
     if reporter is not None:

@@ -10,12 +10,13 @@ from numpy.typing import NDArray
 from coop_drake.tree.pose import FloatArray
 from coop_drake.typed_data import (
     EXACT,
+    TAGGED,
     Bounds,
+    Codec,
     DataError,
     Limits,
     NotNegative,
     Positive,
-    Vector,
     check_fields,
 )
 
@@ -34,7 +35,7 @@ EnergyFactor = Annotated[float, Limits(at_least=1.0)]
 Gain = Annotated[Positive, EXACT]
 """A gain of one transition, of any size: it may be a product of numbers of a gain set."""
 
-AxisGains = Annotated[Vector, Limits(above=0.0)]
+AxisGains = Annotated[FloatArray, Codec(tuple[Gain, ...], np.array, np.ndarray.tolist)]
 """Gains of one transition, one for each of the axes (theta, q...), shape (1 + n,)."""
 
 
@@ -281,4 +282,4 @@ class ScheduledGains:
         return self if given or age <= IDEAL_AGE else replace(self, command_age=age)
 
 
-GainSet = FixedGains | ScheduledGains
+GainSet = Annotated[FixedGains | ScheduledGains, TAGGED]

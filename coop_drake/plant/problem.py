@@ -22,7 +22,8 @@ from coop_drake.plant.parsing import refusal
 from coop_drake.plant.placement import collisions, core, wall_clearance
 from coop_drake.plant.team import RobotModel, TeamPlant, build_team_plant
 from coop_drake.scenario import Scenario, assemble
-from coop_drake.scenario.limits import ALL_ROBOTS, RobotLimits
+from coop_drake.scenario.deployment import ALL_ROBOTS
+from coop_drake.scenario.model import RobotLimits
 from coop_drake.tree.component_tree import ComponentTree
 from coop_drake.tree.pose import FloatArray
 

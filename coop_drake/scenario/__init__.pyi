@@ -1,5 +1,4 @@
 from .assembly import Assembly, RobotAssembly, assemble
-from .control import Control, Hold
 from .deployment import (
     ActuatorLimits,
     BlockedWheels,
@@ -14,13 +13,17 @@ from .deployment import (
     RobotDepartures,
     Silence,
     StartOffset,
+    Wave,
+    Waves,
     WheelSlip,
 )
-from .gain_file import dump_gains, with_gains
-from .load import dump_scenario, load_scenario
+from .directives import package_map
+from .load import dump_gains, dump_scenario, load_scenario, with_gains
 from .model import (
+    Control,
     Gains,
     Goal,
+    Hold,
     MapSettings,
     ObjectPose,
     PlantSettings,
@@ -31,8 +34,6 @@ from .model import (
     VisualizationSettings,
     Workspace,
 )
-from .packages import package_map
-from .waves import Wave, Waves
 
 __all__ = [
     "ActuatorLimits",

@@ -8,9 +8,8 @@ from pydrake.math import RigidTransform
 from pydrake.multibody.parsing import AddWeld, ModelDirective, PackageMap
 
 from coop_drake.errors import ScenarioError
-from coop_drake.scenario.directives import checked_directives, flat
+from coop_drake.scenario.directives import checked_directives, flat, package_map
 from coop_drake.scenario.model import Scenario
-from coop_drake.scenario.packages import package_map
 
 _LONGEST = 80
 _LETTERS = "letters, digits, blanks and _ . : + -, with a letter, digit or _ in front"

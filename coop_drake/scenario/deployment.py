@@ -1,6 +1,6 @@
 """Departures of a real team from the ideal one: what is sampled, noisy, late, limited, wrong, lost or pushed.
 
-This file holds the values alone; :mod:`coop_drake.scenario.deployment_checks` refuses values that do not fit
+This file holds the values alone; :mod:`coop_drake.scenario.checks` refuses values that do not fit
 together. Three files apply them: :mod:`coop_drake.diagram.deployment` puts blocks between every controller
 and the plant, :mod:`coop_drake.diagram.station` adds forces to those of the robots, and
 :mod:`coop_drake.diagram.knowledge` makes the controllers' model of the team, in which ``mass_error`` acts. A
@@ -11,15 +11,12 @@ docs.generate`` writes. The compiled loop takes departures from
 ``coop_drake/compiled_loop/running.py``, and refuses those that it does not know.
 """
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from math import sqrt
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from coop_drake.laws.sampling import whole_periods
-from coop_drake.scenario.limits import ALL_ROBOTS
-from coop_drake.scenario.presets import Preset, with_preset
-from coop_drake.scenario.waves import Waves
-from coop_drake.typed_data import Limits, NotNegative, Positive
+from coop_drake.typed_data import Limits, NotNegative, Positive, Real
 
 Delay = Annotated[float, Limits(at_least=0.0, at_most=10.0)]
 """A delay [s]; the loop is lost after fractions of a second, so that a longer one is a typing error."""
@@ -37,6 +34,104 @@ RelativeError = Annotated[float, Limits(at_least=-0.9, at_most=10.0)]
 
 _ALMOST_ALL = 0.99
 """Largest probability of losses for which gains are scheduled [-]; where all is lost no gain would help."""
+
+ALL_ROBOTS = "*"
+"""Name that stands for all robots without an entry of their own."""
+
+Preset = Literal["mobile_base"]
+"""The name of a usual team's departures."""
+
+PRESETS: dict[str, dict[str, Any]] = {
+    "mobile_base": {
+        "control_rate": 200.0,
+        "mass_error": 0.2,
+        "measurements": {"position_noise": 0.001, "angle_noise": 0.0005, "rate_noise": 0.01, "delay": 0.01},
+        "actuators": {"base_force": 650.0, "lag": 0.005},
+        "messages": {"loss": 0.2},
+    }
+}
+"""What each preset says, in the units of ``deployment``. Mobile base: a robot that computes on board, and
+measures poses by laser or camera."""
+
+
+def with_preset(data: dict[str, Any]) -> dict[str, Any]:
+    """Return the data of a section with the departures of its preset in place of the preset's name.
+
+    Keys beside the preset replace its own. The name of a preset that does not exist stays.
+    """
+    preset = data.get("preset")
+    if not isinstance(preset, str) or preset not in PRESETS:
+        return data
+    return _replaced(PRESETS[preset], {name: value for name, value in data.items() if name != "preset"})
+
+
+def _replaced(data: dict[str, Any], changes: dict[str, Any]) -> dict[str, Any]:
+    """Return nested mappings with other entries; an entry that is no mapping replaces what stood there."""
+    nested = {
+        name: _replaced(data[name], entry)
+        for name, entry in changes.items()
+        if isinstance(entry, dict) and isinstance(data.get(name), dict)
+    }
+    return {**data, **changes, **nested}
+
+
+@dataclass(frozen=True)
+class Wave:
+    """An error that is a number for half a period, and its opposite for the other half.
+
+    Attributes:
+        size: Magnitude of the error, in the unit of what is measured; 0 for no error.
+        period: Time from one change to the positive error to the next; the error is constant if the transport
+            takes no longer than a half of it [s].
+        phase: How much of a period has passed at the start [-].
+    """
+
+    size: NotNegative = 0.0
+    period: Annotated[float, Limits(above=0.0, at_most=1000.0)] = 1.0
+    phase: Annotated[float, Limits(at_least=0.0, at_most=1.0)] = 0.0
+
+
+@dataclass(frozen=True)
+class Waves:
+    """Bounded errors of what robots measure, which all robots have alike.
+
+    Attributes:
+        x: Of the object's position along x of W [m].
+        y: Of the object's position along y of W [m].
+        angle: Of the object's angle [rad].
+        joints: Of the position of every joint [rad or m].
+        velocity_x: Of the velocity of every base along x of W [m/s].
+        velocity_y: Of the velocity of every base along y of W [m/s].
+        turn_rate: Of the angular rate of every base [rad/s].
+        joint_rates: Of the rate of every joint [rad/s or m/s].
+    """
+
+    x: Wave = field(default_factory=Wave)
+    y: Wave = field(default_factory=Wave)
+    angle: Wave = field(default_factory=Wave)
+    joints: Wave = field(default_factory=Wave)
+    velocity_x: Wave = field(default_factory=Wave)
+    velocity_y: Wave = field(default_factory=Wave)
+    turn_rate: Wave = field(default_factory=Wave)
+    joint_rates: Wave = field(default_factory=Wave)
+
+    def __bool__(self) -> bool:
+        """Whether there is an error."""
+        return any(getattr(self, one.name).size > 0.0 for one in fields(self))
+
+    def of_port(self, name: str, size: int) -> list[Wave]:
+        """Return the wave of every component of a measured port.
+
+        Args:
+            name: ``object_pose`` for (x, y, angle), else the robot's state (x, y, yaw, joints..., their
+                rates), in which positions and yaw of the base have none: the object's are those of its pose.
+            size: Number of components.
+        """
+        if name == "object_pose":
+            return [self.x, self.y, self.angle]
+        joints = size // 2 - 3
+        rates = [self.velocity_x, self.velocity_y, self.turn_rate, *[self.joint_rates] * joints]
+        return [*[Wave()] * 3, *[self.joints] * joints, *rates]
 
 
 @dataclass(frozen=True)
@@ -109,9 +204,9 @@ class PoseBias:
         theta: Error of the angle [rad].
     """
 
-    x: float = 0.0
-    y: float = 0.0
-    theta: float = 0.0
+    x: Real = 0.0
+    y: Real = 0.0
+    theta: Real = 0.0
 
 
 @dataclass(frozen=True)
@@ -253,10 +348,10 @@ class Push:
     """
 
     body: str
-    force: tuple[float, float]
+    force: tuple[Real, Real]
     time: NotNegative
     duration: Positive
-    torque: float = 0.0
+    torque: Real = 0.0
 
 
 @dataclass(frozen=True)
@@ -270,10 +365,10 @@ class StartOffset:
         joints: Of every joint, robot by robot in their order; empty for none [rad or m].
     """
 
-    x: float = 0.0
-    y: float = 0.0
-    theta: float = 0.0
-    joints: tuple[float, ...] = ()
+    x: Real = 0.0
+    y: Real = 0.0
+    theta: Real = 0.0
+    joints: tuple[Real, ...] = ()
 
 
 @dataclass(frozen=True)

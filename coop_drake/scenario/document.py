@@ -1,11 +1,15 @@
-"""Parses and writes YAML text; refuses text that Drake would misread or that would fill the memory."""
+"""Reads and writes YAML; refuses text that Drake would misread or that would fill the memory."""
 
+import re
 from collections.abc import Iterator
-from typing import Any
+from pathlib import Path
+from typing import Any, TypeVar
 
 import yaml
 
-from coop_drake.typed_data import DataError
+from coop_drake.errors import ScenarioError
+from coop_drake.files import check_readable
+from coop_drake.typed_data import DataError, convert_class
 
 _DEEPEST = 50
 """Levels of lists and mappings inside each other; a scenario needs ten."""
@@ -13,6 +17,13 @@ _DEEPEST = 50
 _LARGEST = 1_000_000
 """Values of a file; what an alias repeats counts as often as it is repeated."""
 
+_LARGEST_FILE = 4.0
+"""Largest file [MB]; it takes some seconds. A floor with more corners can stand in a drawing beside it."""
+
+_FLOAT = re.compile(r"[-+]?\d[\d_]*(\.[\d_]*)?[eE][-+]?\d+")
+"""Numbers that YAML 1.2 knows and YAML 1.1 takes for texts, such as ``1e-3``."""
+
+T = TypeVar("T")
 _Parser = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 
 
@@ -25,6 +36,7 @@ class _Loader(_Parser):  # type: ignore[valid-type,misc]
 
 
 _Loader.add_multi_constructor("", _Loader.tagged)
+_Loader.add_implicit_resolver("tag:yaml.org,2002:float", _FLOAT, list("-+0123456789"))
 
 
 class _Dumper(yaml.SafeDumper):
@@ -69,6 +81,20 @@ def parse(text: str) -> object:
     if isinstance(data, dict):
         return {key: value for key, value in data.items() if not str(key).startswith("_")}
     return data
+
+
+def read_file(cls: type[T], path: Path) -> T:
+    """Read a file into a frozen dataclass of the types that :mod:`coop_drake.typed_data` knows.
+
+    Raises:
+        ScenarioError: The file cannot be read, is no YAML, or departs from the dataclass; with key and value.
+    """
+    try:
+        return convert_class(parse(check_readable(path, _LARGEST_FILE).read_text(encoding="utf-8")), cls)
+    except DataError as error:
+        raise ScenarioError.of(str(path), error.all) from error
+    except (OSError, UnicodeDecodeError) as error:
+        raise ScenarioError(str(path), "the file", str(error), "a readable file") from error
 
 
 def _place(mark: yaml.Mark) -> str:

@@ -1,8 +1,12 @@
 """The sections of a scenario file as frozen dataclasses. Types hold the limits, docstrings the meanings."""
 
+from __future__ import annotations
+
+from copy import deepcopy
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from shapely import Polygon
 
@@ -10,12 +14,12 @@ from coop_drake.answers.problem import PlannerSettings
 from coop_drake.floor_plans.settings import Scale, Tolerance, Unit
 from coop_drake.harmonic_maps import TOLERANCE
 from coop_drake.laws.gains import FixedGains, GainSet, ScheduledGains
-from coop_drake.scenario.control import Control
-from coop_drake.scenario.deployment import Deployment
-from coop_drake.scenario.directive import Directive
-from coop_drake.scenario.limits import RobotLimits
+from coop_drake.scenario.deployment import Deployment, with_preset
 from coop_drake.tree.pose import PlanarPose
-from coop_drake.typed_data import Limits, Positive
+from coop_drake.typed_data import HIDDEN, Codec, Limits, NotNegative, Positive, Real
+
+if TYPE_CHECKING:
+    from pydrake.multibody.parsing import ModelDirective
 
 PREDICTED_SHARE = 0.75
 """Share of a delay that a predictor makes up for [-]: with models that are up to 20 % wrong, and without the
@@ -50,8 +54,8 @@ class Workspace:
         notes: Of a loaded workspace, what the reader of its file left out or assumed, each with the file.
     """
 
-    outer: tuple[tuple[float, float], ...] = ()
-    holes: tuple[tuple[tuple[float, float], ...], ...] = ()
+    outer: tuple[tuple[Real, Real], ...] = ()
+    holes: tuple[tuple[tuple[Real, Real], ...], ...] = ()
     file: str | None = None
     unit: Unit | None = None
     scale: Scale = 1.0
@@ -59,7 +63,7 @@ class Workspace:
     tolerance: Tolerance | None = None
     gap: Tolerance = 0.01
     unknown_is_free: bool = False
-    notes: tuple[str, ...] = field(default=(), metadata={"in_file": False})
+    notes: Annotated[tuple[str, ...], HIDDEN] = ()
 
     @property
     def polygon(self) -> Polygon:
@@ -77,9 +81,9 @@ class ObjectPose:
         theta: Rotation, counter-clockwise [rad].
     """
 
-    x: float
-    y: float
-    theta: float
+    x: Real
+    y: Real
+    theta: Real
 
     @property
     def pose(self) -> PlanarPose:
@@ -98,7 +102,7 @@ class Start:
     """
 
     object: ObjectPose
-    joints: dict[str, tuple[float, ...]]
+    joints: dict[str, tuple[Real, ...]]
 
 
 @dataclass(frozen=True)
@@ -129,7 +133,7 @@ class Goal:
     """
 
     object: ObjectPose
-    joints: dict[str, tuple[float | None, ...]] = field(default_factory=dict)
+    joints: dict[str, tuple[Real | None, ...]] = field(default_factory=dict)
     tolerances: Tolerances = field(default_factory=Tolerances)
 
 
@@ -143,7 +147,7 @@ class Gains:
     """
 
     selected: str = "scheduled"
-    sets: dict[str, FixedGains | ScheduledGains] = field(default_factory=dict)
+    sets: dict[str, GainSet] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         """Add the sets that are always defined."""
@@ -220,6 +224,105 @@ class VisualizationSettings:
 
 
 @dataclass(frozen=True)
+class RobotLimits:
+    """Limits of one robot; each replaces what the robot's model says, null keeps that.
+
+    Attributes:
+        base_speed: Largest speed of the base's frame Bk in W [m/s].
+        base_turn_rate: Largest rate of the base's angle in W [rad/s].
+        joint_rates: Largest rates of the joints, from the base to the end effector; a single one counts for
+            all joints [rad/s or m/s].
+        joint_accelerations: Largest accelerations of the joints, in the same way [rad/s^2 or m/s^2].
+    """
+
+    base_speed: Positive | None = None
+    base_turn_rate: Positive | None = None
+    joint_rates: tuple[Positive | None, ...] = ()
+    joint_accelerations: tuple[Positive | None, ...] = ()
+
+
+EnergyShare = Annotated[float, Limits(at_least=1.0)]
+"""A multiple of the energy with which a cell may be entered; below 1 every entry would ask for a hold [-]."""
+
+
+@dataclass(frozen=True)
+class Hold:
+    """When the team comes to rest inside its cell, and stays there until the cause is gone.
+
+    Attributes:
+        at: Times at which the team is told to hold [s].
+        duration: How long it is told so each time [s].
+        energy: Largest energy of an axis over the bound with which its cell may be entered; a robot that sees
+            more, or that its Delta E is negative, asks for a hold; null for never [-].
+        silence: Longest time without a message of a robot, after which the team is held, and of a robot
+            without a message of the supervisor, after which it holds by itself and asks for a hold; null to
+            wait for ever [s]. Needs a control rate.
+    """
+
+    at: tuple[NotNegative, ...] = ()
+    duration: Positive = 3.0
+    energy: EnergyShare | None = None
+    silence: Positive | None = None
+
+
+@dataclass(frozen=True)
+class Control:
+    """Additions to the controllers, from what each robot measures and commands itself; no message is needed.
+
+    Attributes:
+        predictor: Whether robots compute with the present, predicted from measurements of the known delay
+            ``deployment.measurements.delay`` and from their commands since; nothing without a delay.
+        observer: Whether robots estimate slow disturbances, such as friction, a slope or a push, and
+            compensate them.
+        hold: When the team is held; null for never.
+    """
+
+    predictor: bool = False
+    observer: bool = False
+    hold: Hold | None = None
+
+
+@dataclass(frozen=True)
+class DirectiveEntry:
+    """One entry of a list of model directives. To hold it does not import Drake, to read it does.
+
+    Attributes:
+        data: Plain data of the YAML file.
+    """
+
+    data: object
+
+    @cached_property
+    def drake(self) -> ModelDirective:
+        """The directive as Drake's type.
+
+        Raises:
+            DataError: The first departure of the data from that type, with its key in the directive.
+        """
+        from coop_drake.scenario.directives import read_directive
+
+        return read_directive(self.data, "")
+
+    @cached_property
+    def plain(self) -> object:
+        """Plain data of Drake's type with all its defaults, which the many runs of one scenario share."""
+        from coop_drake.scenario.directives import write_directive
+
+        return write_directive(self.drake)
+
+    def __reduce__(self) -> tuple[type[DirectiveEntry], tuple[object]]:
+        """Pickle without Drake's type, which cannot be."""
+        return type(self), (self.data,)
+
+
+def _write(entry: DirectiveEntry) -> object:
+    return deepcopy(entry.plain)
+
+
+Directive = Annotated[DirectiveEntry, Codec(Any, DirectiveEntry, _write)]
+
+
+@dataclass(frozen=True)
 class Scenario:
     """One transport: the floor, the team, start, goal and settings.
 
@@ -253,7 +356,7 @@ class Scenario:
     start: Start
     goal: Goal
     object: str = "object"
-    fixed_joints: dict[str, dict[str, float | None]] = field(default_factory=dict)
+    fixed_joints: dict[str, dict[str, Real | None]] = field(default_factory=dict)
     load_shares: dict[str, Annotated[float, Limits(at_least=0.0, at_most=1.0)]] = field(default_factory=dict)
     planner: PlannerSettings = field(default_factory=PlannerSettings)
     gains: Gains = field(default_factory=Gains)
@@ -264,7 +367,13 @@ class Scenario:
     deployment: Deployment = field(default_factory=Deployment)
     control: Control = field(default_factory=Control)
     visualization: VisualizationSettings = field(default_factory=VisualizationSettings)
-    path: Path = field(default=Path("scenario.yaml"), metadata={"in_file": False})
+    path: Annotated[Path, HIDDEN] = Path("scenario.yaml")
+
+    @staticmethod
+    def completed(data: dict[str, Any]) -> dict[str, Any]:
+        """Return the data of a file with the departures of its preset."""
+        deployment = data.get("deployment")
+        return data | {"deployment": with_preset(deployment)} if isinstance(deployment, dict) else data
 
     @property
     def name(self) -> str:

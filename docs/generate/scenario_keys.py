@@ -5,14 +5,13 @@ from __future__ import annotations
 import dataclasses
 import inspect
 import re
-import types
 import typing
 from collections.abc import Iterator
 from typing import Any, NamedTuple
 
 from coop_drake.scenario.json_schema import field_meanings
 from coop_drake.scenario.model import Scenario
-from coop_drake.typed_data import SCALARS, FieldType, Limits, classes_by_tag, field_types
+from coop_drake.typed_data import FieldType, classes_by_tag, describe, field_types
 
 __all__ = ["ScenarioKey", "Section", "sections"]
 
@@ -60,7 +59,7 @@ def sections(cls: Any = Scenario, path: str = "") -> Iterator[Section]:
     keys = []
     for name, field in field_types(cls).items():
         unit, meaning = _unit_apart(meanings[name])
-        keys.append(ScenarioKey(name, _kind(field.kind), unit, _default(field), meaning))
+        keys.append(ScenarioKey(name, describe(field.kind, brief=True), unit, _default(field), meaning))
     yield Section(path, (inspect.getdoc(cls) or "").split("\n\n")[0], tuple(keys))
     for name, field in field_types(cls).items():
         place = f"{path}.{name}" if path else name
@@ -86,30 +85,6 @@ def _unit_apart(meaning: str) -> tuple[str, str]:
     if found is None:
         return "", meaning
     return found.group(1), meaning.replace(found.group(0), "", 1)
-
-
-def _kind(kind: Any) -> str:
-    """Return a type and its limits in words."""
-    origin, arguments = typing.get_origin(kind), typing.get_args(kind)
-    if kind in SCALARS:
-        return SCALARS[kind].replace("finite ", "")
-    if origin is typing.Annotated:
-        if arguments[0] is Any:
-            return "any value"
-        noun = "whole number" if arguments[0] is int else "number"
-        limits = [extra.describe(noun) for extra in arguments[1:] if isinstance(extra, Limits)]
-        return limits[0] if limits else f"Drake's `{arguments[0].__name__}`"
-    if origin is typing.Literal:
-        return " or ".join(f"`{choice}`" for choice in arguments)
-    if tags := classes_by_tag(kind):
-        return " or ".join(f"`{tag}`" for tag in tags)
-    if origin in (typing.Union, types.UnionType):
-        return " or ".join("null" if part is type(None) else _kind(part) for part in arguments)
-    if origin is tuple:
-        if Ellipsis not in arguments:
-            return "(" + ", ".join(map(_kind, arguments)) + ")"
-        return f"a list, each entry {_kind(arguments[0])}"
-    return f"a mapping from names to {_kind(arguments[1])}" if origin is dict else "a section"
 
 
 def _default(field: FieldType) -> str:

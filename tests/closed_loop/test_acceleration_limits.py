@@ -16,7 +16,7 @@ from coop_drake.planning.limits import planned_accelerations
 from coop_drake.planning.planner import plan as make
 from coop_drake.planning.transitions import reschedule
 from coop_drake.plant import planning_problem, run_setup
-from coop_drake.scenario.limits import RobotLimits
+from coop_drake.scenario.model import RobotLimits
 from coop_drake.simulation import build_maps, simulate
 from coop_drake.verification import verify_file
 from coop_drake.verification.gains import check_accelerations, check_limits

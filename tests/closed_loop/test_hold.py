@@ -21,7 +21,7 @@ from coop_drake.scenario import (
     Silence,
     load_scenario,
 )
-from coop_drake.scenario.validation import validate
+from coop_drake.scenario.checks import validate
 from coop_drake.simulation import Invariants, TeamClearance, build_maps, configure_simulator, simulate
 from coop_drake.simulation.telemetry import Telemetry
 from tests.support.run_checks import verified_run

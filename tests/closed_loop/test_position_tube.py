@@ -9,7 +9,7 @@ import pytest
 from coop_drake.compiled_loop import prepare
 from coop_drake.errors import RefusalError, ScenarioError
 from coop_drake.scenario import ActuatorLimits, Deployment, Hold, Measurements, Messages
-from coop_drake.scenario.control import Control
+from coop_drake.scenario.model import Control
 from coop_drake.simulation import build_maps, simulate
 from coop_drake.verification.runs.budget import check_budget_used
 from coop_drake.verification.runs.rows import Rows

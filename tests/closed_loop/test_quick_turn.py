@@ -33,7 +33,7 @@ def planned(counted=True):
     joints = dict(zip(names, ARMS, strict=True))
     goal = ObjectPose(pose.x + 0.2, pose.y, pose.theta + TURN)
     preset = {"preset": "mobile_base", "actuators": {"base_force": None}}
-    deployment = convert_class(Deployment.completed(preset, "deployment"), Deployment)
+    deployment = convert_class(Deployment.completed(preset), Deployment)
     scenario = replace(
         scenario, deployment=deployment, start=Start(pose, joints), limits={},
         goal=Goal(goal, joints, scenario.goal.tolerances),

@@ -12,7 +12,7 @@ from coop_drake.errors import PlanError, RefusalError
 from coop_drake.planning.planner import plan as make
 from coop_drake.plant import planning_problem, run_setup
 from coop_drake.scenario import Deployment, Measurements
-from coop_drake.scenario.limits import RobotLimits
+from coop_drake.scenario.model import RobotLimits
 from coop_drake.simulation import build_maps, simulate
 from coop_drake.verification import verify_file
 from coop_drake.verification.gains import check_speeds

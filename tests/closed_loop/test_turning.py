@@ -40,7 +40,7 @@ def maps():
 
 def turned(mass_error, **rule):
     deployment = convert_class(
-        Deployment.completed({"preset": "mobile_base", "mass_error": mass_error}, "deployment"), Deployment
+        Deployment.completed({"preset": "mobile_base", "mass_error": mass_error}), Deployment
     )
     scenario = small_scenario("elbow")
     plan = turning_plan(

@@ -21,7 +21,7 @@ from coop_drake.scenario import (
     RobotDepartures,
     Silence,
 )
-from coop_drake.scenario.deployment_checks import check_deployment
+from coop_drake.scenario.checks import check_deployment
 from coop_drake.simulation import configure_simulator
 from tests.support.small_loop import small_maps, small_problem
 from tests.support.small_scenario import small_scenario

@@ -136,7 +136,7 @@ def test_a_run_with_this_friction_keeps_to_the_plan_and_one_with_far_more_is_not
 
 def test_half_a_newton_metre_in_light_arms_is_more_than_their_funnels_bear():
     scenario = load_scenario(MODELS / "elbow.scenario.yaml")
-    departures = convert_class(Deployment.completed(preset({"coulomb": 0.5}), "deployment"), Deployment)
+    departures = convert_class(Deployment.completed(preset({"coulomb": 0.5})), Deployment)
     scenario, gains = replace(scenario, deployment=departures), scenario.gain_sets["scheduled"]
     problem = planning_problem(scenario)
     ideal = plan(problem, gains, gain_set_name="scheduled").plan

@@ -24,7 +24,7 @@ from coop_drake.planning.transitions import with_gains
 from coop_drake.plant import planning_problem
 from coop_drake.plant.budgets import budget_of, scenario_budgets
 from coop_drake.scenario import Deployment, load_scenario
-from coop_drake.scenario.limits import RobotLimits
+from coop_drake.scenario.model import RobotLimits
 from coop_drake.typed_data import convert_class, field_types
 from coop_drake.verification import answer as exact
 from coop_drake.verification import verify_plan

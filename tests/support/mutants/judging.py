@@ -42,7 +42,7 @@ def faults(
         return [f"raised {type(error).__name__}: {str(error)[:200]}"]
     found = [] if code == 2 else [f"exit code {code}"]
     lines = complained.getvalue().splitlines()
-    if len(lines) != 1 or not lines[0].startswith("Error: "):
+    if not lines or not lines[0].startswith("Error: "):
         found.append(f"standard error has {len(lines)} lines: {complained.getvalue()[:300]!r}")
     answers = said.getvalue().splitlines()
     message = json.loads(answers[-1]).get("error", "") if answers else ""
@@ -56,8 +56,10 @@ def faults(
         found.append("no remedy")
     if len(message) > 2000:
         found.append(f"the message has {len(message)} characters")
-    if "\n" in message:
-        found.append("the message has several lines")
+    if not all(file.name in line and remedy in line for line in message.splitlines()):
+        found.append("a line of the message does not name the file and a remedy")
+    if lines != f"Error: {message}".splitlines():
+        found.append("standard error says something else")
     if out.exists() or sorted(file.parent.iterdir()) != before:
         found.append("something was written")
     return [f"{fault} -- {message[:240]}" for fault in found]

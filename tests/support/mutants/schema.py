@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from coop_drake.scenario import Scenario
-from coop_drake.scenario.directive import DirectiveEntry
+from coop_drake.scenario.model import DirectiveEntry
 from tests.support.mutants.mutant import Mutant, Place, at, block, dotted, flow, put, renamed, without
 
 _NUMBERS = {
@@ -52,7 +52,7 @@ def _mutant(kind: str, path: Place, because: str, data: Any, key: str | None = N
 
 def _of_section(data: dict[str, Any], path: Place, cls: type) -> Iterator[Mutant]:
     section = at(data, path)
-    fields = {f.name: f for f in dataclasses.fields(cls) if f.metadata.get("in_file", True)}
+    fields = {f.name: f for f in dataclasses.fields(cls)}
     for name in section:
         if name == "_tag":
             continue
