@@ -60,9 +60,11 @@ def test_limits_are_listed_in_words(listed):
     assert allowed("planner", "margin") == "zero or a positive number"
     assert allowed("planner", "max_slices") == "a positive whole number"
     assert allowed("deployment", "mass_error") == "a number between -0.9 and 10"
-    assert allowed("deployment.actuators", "base_force") == "a positive number or null"
+    assert allowed("deployment.actuators", "base_force") == "a positive number, or null"
     assert allowed("gains.sets.NAME: !FixedGains", "energy_factor") == "a number of at least 1"
-    assert allowed("gains", "sets") == "a mapping from names to `!FixedGains` or `!ScheduledGains`"
+    assert allowed("gains", "sets") == (
+        "a mapping from names to a mapping with a tag, one of !FixedGains, !ScheduledGains"
+    )
 
 
 def test_units_stand_apart(listed):

@@ -5,9 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated
 
-from coop_drake.typed_data import EXACT, Positive, Vector
+from coop_drake.typed_data import Bound, Vector
 
-_Exact = Annotated[Positive, EXACT]
 
 
 @dataclass(frozen=True)
@@ -27,9 +26,9 @@ class Alarms:
         turn: Of the measured angle of a base, likewise [rad].
     """
 
-    position: _Exact
-    velocity: _Exact
-    ahead: _Exact
+    position: Bound
+    velocity: Bound
+    ahead: Bound
     axis_reserve: Vector
-    grasp: _Exact | None = None
-    turn: _Exact | None = None
+    grasp: Bound | None = None
+    turn: Bound | None = None

@@ -5,9 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated
 
-from coop_drake.typed_data import EXACT, NotNegative, Positive
+from coop_drake.typed_data import Bound, Vector
 
-_Exact = Annotated[Positive, EXACT]
 
 
 @dataclass(frozen=True)
@@ -25,8 +24,8 @@ class AxisTracking:
             joints causes; empty where there is none [m/s^2, rad/s^2 or m/s^2].
     """
 
-    stiffness: _Exact
-    damping: _Exact
-    rate: tuple[_Exact, ...] = ()
-    acceleration: tuple[_Exact, ...] = ()
-    disturbance: tuple[Annotated[NotNegative, EXACT], ...] = ()
+    stiffness: Bound
+    damping: Bound
+    rate: tuple[Bound, ...] = ()
+    acceleration: tuple[Bound, ...] = ()
+    disturbance: tuple[_Exact, ...] = ()

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any, NoReturn, TypeVar
 
 from coop_drake.answers.digest import content_digest
-from coop_drake.errors import PlanError, shortened
+from coop_drake.errors import PlanError, ScenarioError, shortened
 from coop_drake.files import check_readable, write_atomically
 from coop_drake.typed_data import DataError, convert, convert_class
 
@@ -71,7 +71,7 @@ class Document:
                 convert(self.content.get(key), str, key)
             return convert_class(body, kind)
         except DataError as error:
-            self.refuse(error.key, error.value, error.allowed)
+            raise PlanError(str(ScenarioError.of(self.file, error.all))) from error
 
     def entry(self, key: str) -> Any:
         """Return what stands at a key, such as ``cells[3].upper``."""

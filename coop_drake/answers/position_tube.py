@@ -5,10 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated
 
-from coop_drake.typed_data import EXACT, NotNegative, Positive
+from coop_drake.typed_data import Bound, Vector
 
-_Exact = Annotated[Positive, EXACT]
-_NotNegative = Annotated[NotNegative, EXACT]
 
 
 @dataclass(frozen=True)
@@ -29,12 +27,12 @@ class PositionTube:
             time t for which nobody may know of them, see ``laws/departure.py`` [m].
     """
 
-    tracking_stiffness: _Exact
-    tracking_damping: _Exact
-    speed: _Exact
-    radius: _NotNegative
-    rate: _NotNegative
-    velocity: _NotNegative
-    rest: _NotNegative
-    acceleration: _NotNegative
-    ahead: _NotNegative
+    tracking_stiffness: Bound
+    tracking_damping: Bound
+    speed: Bound
+    radius: _Exact
+    rate: _Exact
+    velocity: _Exact
+    rest: _Exact
+    acceleration: _Exact
+    ahead: _Exact

@@ -5,9 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated
 
-from coop_drake.typed_data import EXACT, NotNegative, Positive, Vector
+from coop_drake.typed_data import Bound, Vector
 
-_Exact = Annotated[Positive, EXACT]
 
 
 @dataclass(frozen=True)
@@ -28,8 +27,8 @@ class Restart:
             shape (1 + n,) [rad or m].
     """
 
-    rate: _Exact
-    acceleration: _Exact
-    rest_rate: Annotated[NotNegative, EXACT]
-    wait: _Exact
+    rate: Bound
+    acceleration: Bound
+    rest_rate: _Exact
+    wait: Bound
     departures: tuple[Vector, ...]
