@@ -18,7 +18,7 @@ from pydrake.systems.framework import DiagramBuilder
 from coop_drake.answers import load_plan, save_plan
 from coop_drake.answers.digest import problem_digest
 from coop_drake.answers.log import SimulationLog
-from coop_drake.answers.proof_file import save_proof
+from coop_drake.answers.proof import save_proof
 from coop_drake.cli import simulate, verify
 from coop_drake.cli.task import Task, read_task
 from coop_drake.errors import PlanError

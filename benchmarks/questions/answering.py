@@ -30,7 +30,7 @@ from coop_drake.answers import (
     Undecided,
 )
 from coop_drake.answers.digest import content_digest
-from coop_drake.answers.search_report import SearchReport
+from coop_drake.answers.plan import SearchReport
 from coop_drake.campaign.batches import Batch, Task, Work
 from coop_drake.campaign.plans import versions
 from coop_drake.campaign.results import CampaignFolder

@@ -1,9 +1,18 @@
-from .cell_table import table_1
 from .log import SimulationLog
-from .plan import BeyondLimits, Cell, Found, Infeasible, Plan, PlanningResult, Transition, Undecided
+from .plan import (
+    BeyondLimits,
+    Cell,
+    Found,
+    Infeasible,
+    Plan,
+    PlanningResult,
+    SearchReport,
+    Transition,
+    Undecided,
+    table_1,
+)
 from .plan_file import load_plan, save_plan
 from .problem import PlannerSettings, PlanningProblem
-from .search_report import SearchReport
 
 __all__ = [
     "BeyondLimits",

@@ -11,6 +11,7 @@ import numpy as np
 from coop_drake.tree.bodies import BODY, Bodies
 from coop_drake.typed_data import (
     EXACT,
+    Bound,
     DataError,
     Limits,
     NotNegative,
@@ -229,3 +230,116 @@ class Tolerance:
     rate_alarm: Vector
     entry_parts: tuple[Annotated[int, Limits(at_least=1, at_most=64)], ...]
     effort: Vector = field(default_factory=lambda: np.zeros(0))
+
+
+# The position's part of a budget: how far the object may depart from its nominal motion.
+
+
+@dataclass(frozen=True)
+class PositionTube:
+    """The tube about the nominal motion of the object's origin, the same in every transition of a plan.
+
+    Attributes:
+        tracking_stiffness: K_t, with which robots pull the object to its nominal motion [1/s^2].
+        tracking_damping: zeta_t, likewise for velocities [1/s].
+        speed: Largest speed of p_G [m/s].
+        radius: r, largest distance of the object's origin from its nominal position [m].
+        rate: Largest departure of its velocity from the nominal one [m/s].
+        velocity: Largest speed of the object's origin [m/s].
+        rest: Largest distance from the nominal position after both have come to rest [m].
+        acceleration: Largest acceleration that a robot commands for the object's origin, times the factor by
+            which its masses may be too large: its forces over the true mass [m/s^2].
+        ahead: Largest distance e + t e' to which its departures e and e' at a sample would take it within the
+            time t for which nobody may know of them, see ``laws/departure.py`` [m].
+    """
+
+    tracking_stiffness: Bound
+    tracking_damping: Bound
+    speed: Bound
+    radius: _Exact
+    rate: _Exact
+    velocity: _Exact
+    rest: _Exact
+    acceleration: _Exact
+    ahead: _Exact
+
+
+# The axes' part of a budget: with which gains angles and joints are pulled to their nominal motions.
+
+
+@dataclass(frozen=True)
+class AxisTracking:
+    """Gains of the pull, the same for all axes and in every transition of a plan.
+
+    Attributes:
+        stiffness: K_a [1/s^2].
+        damping: zeta_a [1/s].
+        rate: Of every axis (theta, q...) a rate that it never exceeds, nominal rate and departure together,
+            with which an error of the age of measurements and viscous friction count; empty where no clock is
+            wrong and no friction is viscous [rad/s or m/s].
+        acceleration: The same of its acceleration [rad/s^2 or m/s^2].
+        disturbance: Of the object's origin, then of every axis, the largest acceleration that friction of
+            joints causes; empty where there is none [m/s^2, rad/s^2 or m/s^2].
+    """
+
+    stiffness: Bound
+    damping: Bound
+    rate: tuple[Bound, ...] = ()
+    acceleration: tuple[Bound, ...] = ()
+    disturbance: tuple[_Exact, ...] = ()
+
+
+# The levels above which a measured departure from the nominal motion is an alarm.
+
+
+@dataclass(frozen=True)
+class Alarms:
+    """The levels that all transitions of a plan with a budget have in common, see ``laws/departure.py``.
+
+    Those of angles and joints stand in every transition's ``tolerance``.
+
+    Attributes:
+        position: Of the object's measured position, the length of the vector [m].
+        velocity: Of its measured velocity, likewise [m/s].
+        ahead: Of where both together take it until a report is used that knows of it, likewise [m].
+        axis_reserve: What must be left of the distance of a nominal axis (theta, q...) to its funnel's bounds
+            beside its level, shape (1 + n,), empty where the budget has no axes [rad or m].
+        grasp: Of the distance of a grasp from where the measured pose of the base has it; null where the
+            budget has no such error [m].
+        turn: Of the measured angle of a base, likewise [rad].
+    """
+
+    position: Bound
+    velocity: Bound
+    ahead: Bound
+    axis_reserve: Vector
+    grasp: Bound | None = None
+    turn: Bound | None = None
+
+
+# From which rests a cell can be begun anew under a plan's budget.
+
+
+@dataclass(frozen=True)
+class Restart:
+    """What a team that begins its current cell anew from rest keeps to, and how far it then departs.
+
+    All axes go slowly to the middle of their goal intervals while the object's position rests, see
+    ``laws/beginning.py``. A cell can be begun anew from a rest in which every axis is inside its slice by
+    more than its departure here, and the object inside the governed region: then every axis stays in its
+    slice, and the object in its tube.
+
+    Attributes:
+        rate: Largest nominal rate on the way [rad/s or m/s].
+        acceleration: Largest nominal acceleration on the way [rad/s^2 or m/s^2].
+        rest_rate: Largest true rate of an axis that is taken for resting [rad/s or m/s].
+        wait: For how long after the way no cell is left, so that nothing of the way is left in the loops [s].
+        departures: Largest departure of every axis in every cell, from the nominal motion on the way, each of
+            shape (1 + n,) [rad or m].
+    """
+
+    rate: Bound
+    acceleration: Bound
+    rest_rate: _Exact
+    wait: Bound
+    departures: tuple[Vector, ...]

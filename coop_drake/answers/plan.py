@@ -5,25 +5,68 @@ The fields of what is written to files stand in the order of the files; their ty
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Annotated
 
 from shapely import Polygon
 
-from coop_drake.answers.alarms import Alarms
-from coop_drake.answers.axis_tracking import AxisTracking
-from coop_drake.answers.budget import Budget, Tolerance
+from coop_drake.answers.budget import Alarms, AxisTracking, Budget, PositionTube, Restart, Tolerance
 from coop_drake.answers.limits import Refusal, SpeedStatement
-from coop_drake.answers.position_tube import PositionTube
 from coop_drake.answers.proof import InfeasibilityProof
 from coop_drake.answers.region import Points, Region
-from coop_drake.answers.restart import Restart
-from coop_drake.answers.search_report import SearchReport
 from coop_drake.laws.gains import TransitionGains
+from coop_drake.tree.pose import FloatArray
 from coop_drake.typed_data import EXACT, NotNegative, Number, Positive, Vector
 
 if TYPE_CHECKING:
     from coop_drake.laws.funnels import Funnel
+
+# The work that a search did before it answered.
+
+
+@dataclass(frozen=True)
+class SearchReport:
+    """The work of a search.
+
+    Attributes:
+        slices: Compound slices swept, all attempts together: those of explorations and the boxes that were
+            tried along sampled paths.
+        first_plan_cpu_seconds: Processor time until a channel was certified, whatever its margin, None if
+            none was [s]. It decides nothing and makes no difference between reports.
+        improvements: Processor time from the question to each plan that was the quickest so far, and its
+            estimated duration, in the order found [s]. Not compared either.
+    """
+
+    slices: int
+    first_plan_cpu_seconds: float | None = field(default=None, compare=False)
+    improvements: tuple[tuple[float, float], ...] = field(default=(), compare=False)
+
+
+# What an exploration left undecided on its last channel.
+
+
+@dataclass(frozen=True)
+class MixedCell:
+    """A set of configurations of which neither freedom nor collision was proved.
+
+    Attributes:
+        robots: Robots that take part; the axes are theta and the joints of these robots in the order of q.
+        lower: Lower ends of the nominal intervals, shape (1 + m,) [rad, m].
+        upper: Upper ends, shape (1 + m,).
+        polygon: Positions p_WL outside which nothing is free [m].
+        width_fraction: Width of its widest interval divided by the range of that axis [-].
+        finest: Whether every interval is below the resolution, so that it will not be halved any more.
+    """
+
+    robots: tuple[int, ...]
+    lower: FloatArray
+    upper: FloatArray
+    polygon: Polygon
+    width_fraction: float
+    finest: bool
+
+
+# The fields of what is written to files stand in the order of the files; their types are checked when read.
 
 
 @dataclass(frozen=True)
@@ -193,3 +236,26 @@ class Undecided:
 
 
 PlanningResult = Found | BeyondLimits | Infeasible | Undecided
+
+
+# The paper's Table 1 for a plan: the intervals of every cell.
+
+
+def table_1(plan: Plan) -> str:
+    """Return the intervals of theta and of every joint, cell by cell, as a Markdown table.
+
+    Angles are unwrapped along the plan [rad]; prismatic joints are in metres.
+    """
+    axes = ("theta", *plan.joint_names)
+    columns = ["cell", *(f"{axis} {bound}" for axis in axes for bound in ("lower", "upper"))]
+    lines = [
+        f"Table 1. Intervals of the object's angle and of every joint in the {len(plan.cells)} cells "
+        "of the plan [rad, prismatic joints m].",
+        "",
+        "| " + " | ".join(columns) + " |",
+        "|" + " ---: |" * len(columns),
+    ]
+    for number, cell in enumerate(plan.cells, start=1):
+        bounds = [f"{value:.3f}" for pair in zip(cell.lower, cell.upper, strict=True) for value in pair]
+        lines.append("| " + " | ".join([str(number), *bounds]) + " |")
+    return "\n".join(lines) + "\n"

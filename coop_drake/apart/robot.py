@@ -359,7 +359,7 @@ class RobotNode:
         self._said, self._reported, self._told_rest = Ready(order.cell, False), inf, -inf
 
     def _holds(self, cell: int, axes: FloatArray, position: FloatArray) -> bool:
-        """Whether the plan states that a cell can be begun anew from a rest, see ``answers/restart.py``."""
+        """Whether the plan states that a cell can be begun anew from a rest, see ``answers/budget.py``."""
         restart = self._plan.restart
         if restart is None or self._knowledge.cells[cell].clearance(position) < 0.0:
             return False

@@ -136,7 +136,7 @@ def report_answer(
 def _write(result: PlanningResult, task: Task, folder: ResultFolder) -> None:
     """Write the plan with its table of cells, a way that limits refuse, or the proof that there is none."""
     from coop_drake.answers import BeyondLimits, Found, Infeasible, save_plan, table_1
-    from coop_drake.answers.proof_file import save_proof
+    from coop_drake.answers.proof import save_proof
     from coop_drake.files import write_atomically
 
     folder.begin("plan", "simulation")

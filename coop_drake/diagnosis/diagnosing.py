@@ -8,7 +8,7 @@ import numpy as np
 from scipy.stats import qmc
 
 from coop_drake.answers import PlanningProblem
-from coop_drake.answers.mixed_cell import MixedCell
+from coop_drake.answers.plan import MixedCell
 from coop_drake.answers.problem import at_goal
 from coop_drake.diagnosis.changes import Relaxation, clear_elsewhere, least_change, try_changes
 from coop_drake.diagnosis.contacts import Contact, Overlap, contacts, deepest, overlaps

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from math import degrees
 from typing import Any
 
-from coop_drake.answers.mixed_cell import MixedCell
+from coop_drake.answers.plan import MixedCell
 from coop_drake.diagnosis.changes import Relaxation
 from coop_drake.diagnosis.contacts import BodyAtFault
 from coop_drake.diagnosis.diagnosing import BlockedPose, Diagnosis, PassageFindings

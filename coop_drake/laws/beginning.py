@@ -10,7 +10,7 @@ the object's position rests, or returns to its cell in the same way where it is 
 takes over: its funnels are closed about the axes, and p_G goes to the target.
 
 A cell is convex in its axes: from a rest inside the slices the way lies inside. What the plan states about
-such rests is in ``answers/restart.py``.
+such rests is in ``answers/budget.py``.
 """
 
 from __future__ import annotations

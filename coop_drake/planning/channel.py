@@ -10,7 +10,7 @@ import numpy as np
 import shapely
 from shapely import MultiPolygon, Point, Polygon
 
-from coop_drake.answers.mixed_cell import MixedCell
+from coop_drake.answers.plan import MixedCell
 from coop_drake.answers.problem import PlanningProblem
 from coop_drake.answers.proof import InfeasibilityProof
 from coop_drake.errors import PlanError

@@ -16,9 +16,16 @@ from shapely.errors import ShapelyError
 from coop_drake.answers.budget import Budget
 from coop_drake.answers.digest import problem_digest
 from coop_drake.answers.limits import SLOWEST_AGE
-from coop_drake.answers.plan import BeyondLimits, Found, Infeasible, Plan, PlanningResult, Undecided
+from coop_drake.answers.plan import (
+    BeyondLimits,
+    Found,
+    Infeasible,
+    Plan,
+    PlanningResult,
+    SearchReport,
+    Undecided,
+)
 from coop_drake.answers.problem import PlanningProblem
-from coop_drake.answers.search_report import SearchReport
 from coop_drake.errors import GeometryError, PatienceError, PlanError, StallError, TooQuickError
 from coop_drake.laws import GainSet, ScheduledGains
 from coop_drake.planning.cell_selection import quickest_plan

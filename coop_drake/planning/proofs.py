@@ -10,7 +10,7 @@ import shapely
 from shapely import Polygon
 from shapely.errors import ShapelyError
 
-from coop_drake.answers.mixed_cell import MixedCell
+from coop_drake.answers.plan import MixedCell
 from coop_drake.answers.problem import PlanningProblem
 from coop_drake.answers.proof import InfeasibilityProof
 from coop_drake.errors import GeometryError

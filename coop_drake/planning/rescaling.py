@@ -12,8 +12,7 @@ import shapely
 from shapely import Polygon
 
 from coop_drake.answers.limits import TeamLimits
-from coop_drake.answers.mixed_cell import MixedCell
-from coop_drake.answers.plan import Cell, Plan
+from coop_drake.answers.plan import Cell, MixedCell, Plan
 from coop_drake.answers.problem import PlannerSettings, PlanningProblem
 from coop_drake.answers.proof import Cut, InfeasibilityProof, OverCell, OverSlice
 from coop_drake.laws.gains import FixedGains, GainSet

@@ -18,8 +18,8 @@ from time import thread_time
 
 from shapely.errors import ShapelyError
 
+from coop_drake.answers.plan import SearchReport
 from coop_drake.answers.problem import PlanningProblem
-from coop_drake.answers.search_report import SearchReport
 from coop_drake.errors import GeometryError, PatienceError, PlanError
 from coop_drake.geometry.body_pairs import BodyPairs
 from coop_drake.geometry.minkowski import to_polygon

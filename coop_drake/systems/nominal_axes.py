@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from pydrake.systems.framework import BasicVector, Context, DiscreteValues, EventStatus
 
-from coop_drake.answers.axis_tracking import AxisTracking
+from coop_drake.answers.budget import AxisTracking
 from coop_drake.laws.nominal_axes import carry_axes, place_on_axes, pull_axes
 from coop_drake.systems.block import Block
 from coop_drake.tree.pose import FloatArray

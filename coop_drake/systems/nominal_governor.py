@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 from pydrake.systems.framework import BasicVector, Context, DiscreteValues, EventStatus
 
-from coop_drake.answers.position_tube import PositionTube
+from coop_drake.answers.budget import PositionTube
 from coop_drake.harmonic_maps import VelocityField
 from coop_drake.laws.nominal import nominal_flow
 from coop_drake.systems.block import Block

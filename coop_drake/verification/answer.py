@@ -17,8 +17,7 @@ from coop_drake.answers.document import Document
 from coop_drake.answers.plan import Plan
 from coop_drake.answers.plan_file import plan_document
 from coop_drake.answers.problem import PlanningProblem
-from coop_drake.answers.proof import InfeasibilityProof
-from coop_drake.answers.proof_file import proof_document
+from coop_drake.answers.proof import InfeasibilityProof, proof_document
 from coop_drake.checking import RefusedError, check
 from coop_drake.errors import RefusalError
 from coop_drake.laws import GainSet

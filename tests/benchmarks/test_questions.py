@@ -17,8 +17,8 @@ from benchmarks.questions.question import narrowest_corridor, random_question
 from benchmarks.questions.settings import QuestionSettings
 from benchmarks.questions.teams import SHAPES, random_count, random_team
 from coop_drake.answers import Found, Infeasible, Undecided
+from coop_drake.answers.plan import SearchReport
 from coop_drake.answers.problem import at_goal
-from coop_drake.answers.search_report import SearchReport
 from coop_drake.planning.planner import plan
 from coop_drake.plant import planning_problem
 from coop_drake.plant.placement import collisions

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from shapely import Point
 
-from coop_drake.answers.plan_checks import check_plan
+from coop_drake.answers.plan_file import check_plan
 from coop_drake.laws import FixedGains, ScheduledGains, transition_gains
 from coop_drake.laws.gain_schedule import schedule_of
 from coop_drake.planning import make_plan, plan_time

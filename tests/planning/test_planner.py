@@ -13,8 +13,7 @@ from shapely import box
 
 from coop_drake.answers import BeyondLimits, Found, Infeasible, SearchReport, Undecided, load_plan, save_plan
 from coop_drake.answers.limits import Refusal
-from coop_drake.answers.plan_checks import check_plan
-from coop_drake.answers.plan_file import plan_document
+from coop_drake.answers.plan_file import check_plan, plan_document
 from coop_drake.errors import StallError
 from coop_drake.laws import ScheduledGains
 from coop_drake.planning import planner

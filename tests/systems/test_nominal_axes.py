@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from coop_drake.answers.axis_tracking import AxisTracking
+from coop_drake.answers.budget import AxisTracking
 from coop_drake.laws.nominal_axes import carry_axes, pulled_axis
 from coop_drake.systems import AxisMotion, NominalAxes
 from tests.support.system_checks import context_with, evaluate, port_sizes

@@ -9,9 +9,8 @@ import pytest
 import shapely
 
 from coop_drake.answers import save_plan
-from coop_drake.answers.belonging import other_age
 from coop_drake.answers.document import Document
-from coop_drake.answers.plan_file import read_plan
+from coop_drake.answers.plan_file import other_age, read_plan
 from coop_drake.errors import PlanError, RefusalError
 from coop_drake.planning.planner import plan as make
 from coop_drake.verification import verify_file

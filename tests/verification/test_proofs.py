@@ -12,7 +12,7 @@ from shapely import Polygon
 from coop_drake.answers.digest import problem_digest
 from coop_drake.answers.document import Document
 from coop_drake.answers.problem import PlanningProblem
-from coop_drake.answers.proof_file import read_proof, save_proof
+from coop_drake.answers.proof import read_proof, save_proof
 from coop_drake.errors import PlanError, RefusalError
 from coop_drake.planning import find_channel
 from coop_drake.planning.cells.exploration import Exploration

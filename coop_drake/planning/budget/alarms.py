@@ -6,10 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from coop_drake.answers.alarms import Alarms
-from coop_drake.answers.axis_tracking import AxisTracking
-from coop_drake.answers.budget import Budget
-from coop_drake.answers.position_tube import PositionTube
+from coop_drake.answers.budget import Alarms, AxisTracking, Budget, PositionTube
 from coop_drake.laws.departure import growth, unseen_time
 from coop_drake.tree.pose import FloatArray
 

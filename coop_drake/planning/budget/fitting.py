@@ -7,8 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from coop_drake.answers.axis_tracking import AxisTracking
-from coop_drake.answers.budget import Budget, Tolerance
+from coop_drake.answers.budget import AxisTracking, Budget, Tolerance
 from coop_drake.answers.plan import Plan, Transition
 from coop_drake.answers.problem import PlanningProblem
 from coop_drake.laws import ScheduledGains

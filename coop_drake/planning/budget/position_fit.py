@@ -17,9 +17,8 @@ import shapely
 from numpy.typing import NDArray
 from shapely import Point, Polygon
 
-from coop_drake.answers.budget import Budget
+from coop_drake.answers.budget import Budget, PositionTube
 from coop_drake.answers.plan import Cell, Plan, Transition
-from coop_drake.answers.position_tube import PositionTube
 from coop_drake.answers.problem import PlanningProblem
 from coop_drake.errors import GeometryError, StallError
 from coop_drake.geometry.boundary import BoundaryDistance

@@ -28,8 +28,7 @@ from math import ceil
 import numpy as np
 from scipy.linalg import expm
 
-from coop_drake.answers.budget import Budget
-from coop_drake.answers.position_tube import PositionTube
+from coop_drake.answers.budget import Budget, PositionTube
 from coop_drake.jit import compiled
 from coop_drake.laws.sampling import whole_periods
 from coop_drake.planning.budget.alarms import unseen_of

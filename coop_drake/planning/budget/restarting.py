@@ -1,4 +1,4 @@
-"""How far axes depart where a team begins a cell anew from rest, see ``answers/restart.py``.
+"""How far axes depart where a team begins a cell anew from rest, see ``answers/budget.py``.
 
 On the slow way of ``laws/beginning.py`` every axis has at most a rate and an acceleration that are the same
 in all cells. The departures follow as in a transition, see ``departing.py``, from a rest with constant
@@ -17,9 +17,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from coop_drake.answers.budget import Budget
+from coop_drake.answers.budget import Budget, Restart
 from coop_drake.answers.plan import Plan
-from coop_drake.answers.restart import Restart
 from coop_drake.laws.beginning import ACCELERATION, RATE
 from coop_drake.laws.nominal_axes import lag_factors
 from coop_drake.laws.readiness import RATE_TOLERANCE

@@ -8,8 +8,7 @@ from itertools import chain
 
 from shapely.errors import ShapelyError
 
-from coop_drake.answers.axis_tracking import AxisTracking
-from coop_drake.answers.budget import Budget
+from coop_drake.answers.budget import AxisTracking, Budget
 from coop_drake.answers.plan import Plan
 from coop_drake.answers.problem import PlanningProblem
 from coop_drake.errors import GeometryError, PlanError, StallError

@@ -10,7 +10,7 @@ from enum import Enum
 import numpy as np
 from shapely import MultiPolygon, Polygon
 
-from coop_drake.answers.mixed_cell import MixedCell
+from coop_drake.answers.plan import MixedCell
 from coop_drake.answers.problem import PlanningProblem, goal_box
 from coop_drake.geometry.body_pairs import BodyPairs
 from coop_drake.geometry.minkowski import to_polygon

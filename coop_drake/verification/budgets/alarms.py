@@ -9,11 +9,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from coop_drake.answers.alarms import Alarms
-from coop_drake.answers.axis_tracking import AxisTracking
-from coop_drake.answers.budget import Budget, Tolerance
+from coop_drake.answers.budget import Alarms, AxisTracking, Budget, PositionTube, Tolerance
 from coop_drake.answers.plan import Plan
-from coop_drake.answers.position_tube import PositionTube
 from coop_drake.errors import RefusalError
 from coop_drake.tree.pose import FloatArray
 from coop_drake.verification.budgets.axis_departure import mistaken

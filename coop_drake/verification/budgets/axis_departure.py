@@ -14,8 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from coop_drake.answers.axis_tracking import AxisTracking
-from coop_drake.answers.budget import Budget
+from coop_drake.answers.budget import AxisTracking, Budget
 from coop_drake.errors import RefusalError
 from coop_drake.tree.pose import FloatArray
 from coop_drake.verification.budgets.position_loop import carried, mean_size

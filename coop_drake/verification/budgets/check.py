@@ -13,8 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from coop_drake.answers.axis_tracking import AxisTracking
-from coop_drake.answers.budget import Budget, Tolerance
+from coop_drake.answers.budget import AxisTracking, Budget, Tolerance
 from coop_drake.answers.plan import Plan, Transition
 from coop_drake.errors import RefusalError
 from coop_drake.tree import ComponentTree

@@ -8,10 +8,8 @@ import numpy as np
 import shapely
 from shapely import LineString, Point, Polygon
 
-from coop_drake.answers.axis_tracking import AxisTracking
-from coop_drake.answers.budget import Budget
+from coop_drake.answers.budget import AxisTracking, Budget, PositionTube
 from coop_drake.answers.plan import Plan
-from coop_drake.answers.position_tube import PositionTube
 from coop_drake.errors import RefusalError
 from coop_drake.verification.budgets.alarms import alarms_of, check_alarms
 from coop_drake.verification.budgets.position_loop import position_bounds

@@ -15,8 +15,7 @@ from math import ceil
 
 import numpy as np
 
-from coop_drake.answers.budget import Budget
-from coop_drake.answers.position_tube import PositionTube
+from coop_drake.answers.budget import Budget, PositionTube
 from coop_drake.errors import RefusalError
 from coop_drake.tree.pose import FloatArray
 
