@@ -5,10 +5,6 @@ from __future__ import annotations
 import pickle
 import traceback
 from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    from coop_drake.typed_data import DataError
 
 _LONGEST_VALUE = 200
 """Characters of a value that a message shows; a whole section of a file would fill the screen."""
@@ -64,10 +60,10 @@ class ScenarioError(CoopDrakeError):
         super().__init__("\n".join(lines + [f"{file}: and {more} more"] * (more > 0)))
 
     @classmethod
-    def of(cls, file: str, faults: Iterable[DataError]) -> ScenarioError:
-        """Return the error of a file with one or more faults."""
-        first, *others = ((one.key or "the file", one.value, one.allowed) for one in faults)
-        return cls(file, *first, others)
+    def of(cls, file: str, faults: Iterable[tuple[str, object, str]]) -> ScenarioError:
+        """Return the error of a file with one or more faults, each as (key, value, allowed)."""
+        first, *others = ((key or "the file", *rest) for key, *rest in faults)
+        return cls(file, *first, others)  # type: ignore[arg-type, call-arg]
 
     @property
     def shown(self) -> str:

@@ -68,6 +68,11 @@ class DataError(ValueError):
         """This departure and the others."""
         return (self, *self.others)
 
+    @property
+    def faults(self) -> list[tuple[str, object, str]]:
+        """Key, value and what is allowed of each of them."""
+        return [(one.key, one.value, one.allowed) for one in self.all]
+
     def below(self, key: str) -> DataError:
         """The same departures, of data that stands at a key."""
         first, *rest = (DataError(below(key, one.key), one.value, one.allowed) for one in self.all)

@@ -71,7 +71,7 @@ class Document:
                 convert(self.content.get(key), str, key)
             return convert_class(body, kind)
         except DataError as error:
-            raise PlanError(str(ScenarioError.of(self.file, error.all))) from error
+            raise PlanError(str(ScenarioError.of(self.file, error.faults))) from error
 
     def entry(self, key: str) -> Any:
         """Return what stands at a key, such as ``cells[3].upper``."""

@@ -14,7 +14,6 @@ from coop_drake.errors import ScenarioError
 from coop_drake.scenario.assembly import assemble
 from coop_drake.scenario.deployment import ALL_ROBOTS, JointFriction
 from coop_drake.scenario.model import Scenario, Workspace
-from coop_drake.typed_data import DataError
 
 Ring = Sequence[tuple[float, float]]
 Faults = Iterator[tuple[str, object, str]]
@@ -44,7 +43,7 @@ def validate(scenario: Scenario) -> None:
             raise
         faults += [(error.key, error.value, error.allowed), *error.others]
     if faults:
-        raise ScenarioError.of(str(scenario.path), [DataError(*fault) for fault in faults])
+        raise ScenarioError.of(str(scenario.path), faults)
 
 
 def _setting_faults(scenario: Scenario) -> Faults:

@@ -52,15 +52,15 @@ def checked_directives(file: str, entries: tuple[DirectiveEntry, ...]) -> tuple[
     Raises:
         ScenarioError: Naming the keys of what Drake cannot read, or would end the process on.
     """
-    found, wrong = [], []
+    found: list[ModelDirective] = []
+    wrong: list[Any] = []
     for index, entry in enumerate(entries):
         key = f"directives[{index}]"
         try:
             found.append(entry.drake)
-            faults = _faults(entry.drake)
-            wrong += [DataError(below(key, place), value, allowed) for place, value, allowed in faults]
+            wrong += [(below(key, place), *fault) for place, *fault in _faults(entry.drake)]
         except DataError as error:
-            wrong += error.below(key).all
+            wrong += error.below(key).faults
     if wrong:
         raise ScenarioError.of(file, wrong)
     return tuple(found)

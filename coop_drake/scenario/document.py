@@ -92,7 +92,7 @@ def read_file(cls: type[T], path: Path) -> T:
     try:
         return convert_class(parse(check_readable(path, _LARGEST_FILE).read_text(encoding="utf-8")), cls)
     except DataError as error:
-        raise ScenarioError.of(str(path), error.all) from error
+        raise ScenarioError.of(str(path), error.faults) from error
     except (OSError, UnicodeDecodeError) as error:
         raise ScenarioError(str(path), "the file", str(error), "a readable file") from error
 
