@@ -17,8 +17,7 @@ import zmq.auth
 from coop_drake.apart.messages import MOST_ROBOTS, SUPERVISOR, WORLD
 from coop_drake.errors import ScenarioError
 from coop_drake.files import check_readable, write_atomically
-from coop_drake.scenario.document import write
-from coop_drake.scenario.reading import read_file
+from coop_drake.scenario.document import read_file, write
 from coop_drake.typed_data import DataError, to_plain
 
 _ADDRESS = re.compile(r"tcp://(\d+\.\d+\.\d+\.\d+):(\d{1,5})")

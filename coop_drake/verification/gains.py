@@ -9,9 +9,9 @@ from math import hypot, sqrt
 import numpy as np
 from shapely import LineString, Point
 
-from coop_drake.answers.belonging import other_age
 from coop_drake.answers.limits import SLOWEST_AGE, Refusal, SpeedStatement, TeamLimits, Unit
 from coop_drake.answers.plan import Plan
+from coop_drake.answers.plan_file import other_age
 from coop_drake.answers.problem import PlanningProblem
 from coop_drake.errors import RefusalError
 from coop_drake.laws import GainSet, ScheduledGains, TransitionGains, transition_gains
