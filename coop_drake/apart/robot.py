@@ -59,7 +59,7 @@ from coop_drake.laws.beginning import (
     slow_motion,
     slow_samples,
 )
-from coop_drake.laws.chain_motion import PX, PY, move_chain
+from coop_drake.laws.chain_motion import PX, PY, motion_room, write_motion
 from coop_drake.laws.departure import BRAKES
 from coop_drake.laws.nominal_axes import place_on_axes
 from coop_drake.laws.sampling import period_of, whole_periods
@@ -465,7 +465,9 @@ class RobotNode:
         state = np.zeros(self._state_size)
         place_on_axes(axes, self._knowledge.axis_motion.mounting, state)
         half, (c, s) = 3 + self._joints, (np.cos(axes[0, 0]), np.sin(axes[0, 0]))
-        hand = move_chain(self._chain, np.array([*state[:half], *np.zeros(half)]))[-1]
+        motion = motion_room(self._chain)
+        write_motion(self._chain, np.array([*state[:half], *np.zeros(half)]), motion)
+        hand = motion[-1]
         p_LE = self._knowledge.p_LE
         state[0] = position[0] + c * p_LE[0] - s * p_LE[1] - hand[PX]
         state[1] = position[1] + s * p_LE[0] + c * p_LE[1] - hand[PY]

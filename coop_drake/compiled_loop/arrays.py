@@ -1,4 +1,4 @@
-"""What the compiled loop computes with, as arrays: transport, departures of a run, what it remembers.
+"""What the compiled loop computes with: transport, departures of a run, what it remembers, and room.
 
 Numbers of all robots are stacked. With n_k joints of robot k, and f_k joints of the robots before it, its own
 axes (theta, q_k) are the rows from k + f_k on of M = N + n; its effort begins at 3 k + f_k, and its state
@@ -9,6 +9,12 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+import numpy as np
+
+from coop_drake.laws.chain_motion import MOTION_COLUMNS
+from coop_drake.laws.sticking import StickingRoom, sticking_room
+from coop_drake.laws.team_dynamics import TeamWork, team_work
+from coop_drake.systems.nominal_kernels import NOMINAL_SIZE
 from coop_drake.systems.team_kernels import FusedTeam
 from coop_drake.tree.pose import FloatArray, IntArray
 from coop_drake.tree.team_arrays import TeamArrays
@@ -186,5 +192,147 @@ class LoopMemory(NamedTuple):
     alarms: FloatArray
 
 
-Loop = tuple[LoopCells, FusedTeam, LoopPlant, LoopNominal, LoopDepartures, LoopMemory]
-"""All of them, in the order in which compiled functions take them."""
+# Room for what is computed on the way: what compiled functions allocate is counted wherever it is passed on.
+
+TOLD, ENERGY, ACCELERATION, COMMAND = 10, 0, 1, 4
+"""What a robot tells the log beside its report, and where: Delta E where no nominal motion leads [m^2/s^2],
+the object's desired acceleration [m/s^2, rad/s^2], then what ``end_effector_command`` writes."""
+
+
+class RobotRoom(NamedTuple):
+    """Room for what one robot computes at a sample.
+
+    Attributes:
+        pose: The object's pose as the robot knows it, shape (3,).
+        seen: The object's state as the robot knows it, then on the nominal axes of now, and of when efforts
+            act, shape (3, 6).
+        robots: The robot's own state in the same three ways, shape (3, 2 (3 + n)).
+        governed: p_G' as the robot moves its own p_G, zero where a nominal motion leads, then the desired
+            acceleration of the object's origin, shape (4,) [m/s, m/s^2].
+        told: What the robot tells the log, see ``TOLD``.
+        law: What the law of all axes asks for, shape (M,).
+        pulled: That of the robot's with the pull to the nominal motion, shape (M,).
+        later: Nominal axes when efforts act, shape (3, M).
+        fading: The jumps of the robot's axes that fade in the cell, shape (M,).
+        levels: Levels of all axes and of their rates, shape (2, M).
+        held: Efforts before the sample, shape (3 N + n,) [N, N m].
+        errors: Of one measurement, shape (2 (3 + n),).
+        line: A line of measurements, then what is measured, shape (rows + 1, 1 + size).
+        arrivals: What a channel of reports holds next, of its shape.
+        motion: Motion of the longest chain, see ``chain_motion.motion_room``.
+        shown: What ``show_nominal`` writes, shape (6,).
+    """
+
+    pose: FloatArray
+    seen: FloatArray
+    robots: FloatArray
+    governed: FloatArray
+    told: FloatArray
+    law: FloatArray
+    pulled: FloatArray
+    later: FloatArray
+    fading: FloatArray
+    levels: FloatArray
+    held: FloatArray
+    errors: FloatArray
+    line: FloatArray
+    arrivals: FloatArray
+    motion: FloatArray
+    shown: FloatArray
+
+
+def robot_room(team: FusedTeam, memory: LoopMemory) -> RobotRoom:
+    """Return room for the robots of a team."""
+    M, state, line = memory.jumps.size, memory.state.size, memory.lines.shape[2:]
+    return RobotRoom(
+        np.empty(3), np.empty((3, 6)), np.empty((3, state)), np.empty(4), np.empty(TOLD), np.empty(M),
+        np.empty(M), np.empty((3, M)), np.empty(M), np.empty((2, M)), np.empty(memory.efforts.shape[1]),
+        np.empty(state), np.empty((line[0] + 1, line[1])), np.empty(memory.channels.shape[1:]),
+        _longest_motion(team), np.empty(NOMINAL_SIZE),
+    )  # fmt: skip
+
+
+def _longest_motion(team: FusedTeam) -> FloatArray:
+    """Return room for the motion of the longest chain of a team."""
+    return np.empty((int(np.diff(team.first[:2]).max()), MOTION_COLUMNS))
+
+
+class MotionRoom(NamedTuple):
+    """Room for what ``advance`` computes.
+
+    Attributes:
+        acting: Efforts at the sample, shape (3 N + n,) [N, N m].
+        states: State at the stage, at the sample, and what it changes by, shape (3, 2 (3 + n)).
+        slopes: Accelerations, shape (3 + n,).
+        wrenches: On bases and object, shape (N + 1, 3) [N, N m].
+        efforts: Of the joints, at the places of their rates, shape (3 + n,) [N m or N].
+        robot: State of a robot with the most joints that there can be, shape (2 (3 + n),).
+        motion: Motion of the longest chain, see ``chain_motion.motion_room``.
+        work: Of the equations of motion.
+        sticking: Of blocked wheels and of the friction of joints.
+        blocked: 1 for bases with blocked wheels, else 0, shape (N,).
+    """
+
+    acting: FloatArray
+    states: FloatArray
+    slopes: FloatArray
+    wrenches: FloatArray
+    efforts: FloatArray
+    robot: FloatArray
+    motion: FloatArray
+    work: TeamWork
+    sticking: StickingRoom
+    blocked: FloatArray
+
+
+def plant_room(team: FusedTeam, plant: LoopPlant) -> MotionRoom:
+    """Return room for a team's motion."""
+    links, robots = plant.tree.shape[0], team.yaws.size
+    n = links + 2
+    return MotionRoom(
+        np.empty(3 * robots + n - 3), np.empty((3, 2 * n)), np.empty(n), np.empty((robots + 1, 3)),
+        np.zeros(n), np.empty(2 * n), _longest_motion(team), team_work(plant.tree),
+        sticking_room(links, robots), np.zeros(robots),
+    )  # fmt: skip
+
+
+class WatchRoom(NamedTuple):
+    """What is remembered of a run to measure no distance in vain: P convex pieces, V vertices, K pairs.
+
+    Attributes:
+        z: The configuration of now, shape (3 + n,) [m, rad].
+        last_z: The one before, NaN at the first sample.
+        region: The cell, the distance of the position to its boundary when that was measured last, and the
+            position then, shape (4,) [m].
+        before: Forces (x, y) of all bases at the sample before, then the object's rate of rotation; NaN at
+            the first one, shape (2 N + 1,) [N, rad/s].
+        way: How far any point may have moved since the start, and how far two bodies may have moved
+            relative to each other: the motion of the object does not count there, shape (2,) [m].
+        walls: Distance of every piece to the walls when it was measured last, and the way until then; NaN
+            before, shape (P, 2) [m].
+        pairs: Distance of every pair that must not touch, and its way until then, shape (K, 2) [m].
+        poses: Room for the poses of all components, see ``place_into``.
+        vertices: Room for the vertices in W, shape (V, 2) [m].
+        discs: Room for the discs in W, shape (P, 3) [m].
+    """
+
+    z: FloatArray
+    last_z: FloatArray
+    region: FloatArray
+    before: FloatArray
+    way: FloatArray
+    walls: FloatArray
+    pairs: FloatArray
+    poses: FloatArray
+    vertices: FloatArray
+    discs: FloatArray
+
+
+def watch_room(plant: LoopPlant) -> WatchRoom:
+    """Return what is remembered of a run that has not begun."""
+    shapes, n = plant.shapes, plant.tree.shape[0] + 2
+    return WatchRoom(
+        np.empty(n), np.full(n, np.nan), np.full(4, np.nan), np.full(2 * plant.bases.size - 1, np.nan),
+        np.zeros(2), np.full((len(shapes.pieces), 2), np.nan), np.full((len(shapes.pairs), 2), np.nan),
+        *shapes.room(),
+    )  # fmt: skip

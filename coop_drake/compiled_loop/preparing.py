@@ -192,7 +192,7 @@ def _robots(team: TeamPlant, knowledge: Sequence[RobotKnowledge]) -> FusedTeam:
 
 def _plant(scenario: Scenario, team: TeamPlant, tree: ComponentTree, models: FusedTeam) -> LoopPlant:
     whole = read_team_tree(team, tree)
-    shapes, walls = TeamClearance(scenario.workspace.polygon, tree).kernel_arguments
+    clearance = TeamClearance(scenario.workspace.polygon, tree)
     rows = [(0, 0)]
     for k, robot in enumerate(team.robots):
         begin = k + int(models.first[2, k])
@@ -201,8 +201,8 @@ def _plant(scenario: Scenario, team: TeamPlant, tree: ComponentTree, models: Fus
         whole.tree,
         whole.bases,
         whole.places,
-        shapes,
-        walls,
+        clearance.team,
+        clearance.walls,
         _reach(tree),
         np.array(rows, dtype=np.int64).T.copy(),
         whole.strongest,

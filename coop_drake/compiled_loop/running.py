@@ -9,8 +9,15 @@ from math import inf, nan, sqrt
 
 import numpy as np
 
-from coop_drake.compiled_loop.arrays import LoopDepartures, LoopMemory, LoopNominal
-from coop_drake.compiled_loop.looping import run_loop
+from coop_drake.compiled_loop.arrays import (
+    LoopDepartures,
+    LoopMemory,
+    LoopNominal,
+    plant_room,
+    robot_room,
+    watch_room,
+)
+from coop_drake.compiled_loop.loop import run_loop
 from coop_drake.compiled_loop.preparing import CompiledTransport
 from coop_drake.compiled_loop.watching import (
     ALARM,
@@ -43,6 +50,7 @@ from coop_drake.compiled_loop.watching import (
     TURN,
     VALUE,
     WALL,
+    begin_figures,
 )
 from coop_drake.diagram.deployment import (
     clock_shift,
@@ -286,13 +294,18 @@ def run(
     departures = departures_of(transport, deployment)
     period, memory = float(departures.times[0]), memory_of(transport, departures)
     memory.state[transport.order] += displacement(deployment, len(transport.order))
-    figures = run_loop(
+    team, plant, figures = believed(transport.team, deployment.mass_error), transport.plant, begin_figures()
+    run_loop(
         transport.cells,
-        believed(transport.team, deployment.mass_error),
-        transport.plant,
+        team,
+        plant,
         nominal_of(transport, period),
         departures,
         memory,
+        robot_room(team, memory),
+        plant_room(team, plant),
+        watch_room(plant),
+        figures,
     )
     return _outcome(transport, figures, period)
 

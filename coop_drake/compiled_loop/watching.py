@@ -1,27 +1,34 @@
-"""Margins of the compiled loop at every sample, and whether a run has ended."""
+"""Margins of the compiled loop at every sample, and whether a run has ended.
+
+No point of a body moves further than the position does, plus what every angle and joint moves it at most. A
+distance therefore stays above what it was when it was measured last, less the way since then; it is measured
+only where it can be the smallest so far.
+"""
 
 from __future__ import annotations
 
 from math import hypot, inf, isnan
-from typing import NamedTuple
 
 import numpy as np
 
-from coop_drake.compiled_loop.arrays import LoopCells, LoopDepartures, LoopMemory, LoopNominal, LoopPlant
-from coop_drake.compiled_loop.clearances import (
-    ROUNDING,
-    Clearances,
-    clearance_room,
-    smallest_apart,
-    smallest_to_walls,
-    travel,
+from coop_drake.compiled_loop.arrays import (
+    LoopCells,
+    LoopDepartures,
+    LoopMemory,
+    LoopNominal,
+    LoopPlant,
+    WatchRoom,
 )
 from coop_drake.compiled_loop.robots import heard_cell
 from coop_drake.geometry.boundary import signed_distance
 from coop_drake.jit import compiled
 from coop_drake.laws.axis_table import bounds_of
+from coop_drake.simulation.clearance import pair_apart, piece_to_walls, place_pieces
 from coop_drake.systems.team_kernels import FusedTeam
-from coop_drake.tree.pose import FloatArray
+from coop_drake.tree.pose import FloatArray, IntArray
+
+ROUNDING = 1e-9
+"""More than what rounding errors change of a distance and of the way of a run [m]."""
 
 FIGURES = 20
 (
@@ -69,42 +76,10 @@ all samples of the bases' mean squared force, and the largest change of the obje
 """How a run may have ended."""
 
 
-class WatchRoom(NamedTuple):
-    """What is remembered of a run to measure no distance in vain.
-
-    Attributes:
-        z: The configuration of now, shape (3 + n,) [m, rad].
-        region: The cell, the distance of the position to its boundary when that was measured last, and the
-            position then, shape (4,) [m].
-        before: Forces (x, y) of all bases at the sample before, then the object's rate of rotation; NaN at
-            the first one, shape (2 N + 1,) [N, rad/s].
-        clearances: Those of all bodies.
-    """
-
-    z: FloatArray
-    region: FloatArray
-    before: FloatArray
-    clearances: Clearances
-
-
-@compiled
-def watch_room(plant: LoopPlant) -> WatchRoom:
-    """Return room for a run that has not begun."""
-    region, n, before = np.empty(4), plant.tree.shape[0] + 2, np.empty(2 * plant.bases.size - 1)
-    for i in range(4):
-        region[i] = np.nan
-    for i in range(before.size):
-        before[i] = np.nan
-    return WatchRoom(np.empty(n), region, before, clearance_room(n, plant.shapes))
-
-
-@compiled
 def begin_figures() -> FloatArray:
     """Return the figures of a run that has not begun, shape (``FIGURES``,)."""
     figures = np.zeros(FIGURES)
-    for i in (FUNNEL, REGION, WALL, BODY):
-        figures[i] = inf
-    figures[SHARE] = figures[ALARM] = np.nan
+    figures[[FUNNEL, REGION, WALL, BODY]], figures[[SHARE, ALARM]] = inf, np.nan
     return figures
 
 
@@ -138,14 +113,11 @@ def watch(
         z[i] = memory.state[team.places[0, i]]
     cell, time = int(memory.current[now, 0]), sample * departures.times[0] - memory.current[now, 1]
     figures[SAMPLES], figures[CELL] = sample, cell
-    _watch_cell(sample, cell, cells, plant, nominal, departures, memory, room, figures)
-    watch_distances(z, plant, room.clearances, figures)
-    _watch_departures(sample, cell, z, team, plant, nominal, memory, figures)
-    _watch_efforts(team, memory, room.before, figures)
-    _watch_rotation(memory.state[team.places[1, 2]], room.before, figures)
-    _watch_alarms(nominal, memory, figures)
-    if cell + 1 == cells.rows.shape[0] and left_by_all(cell, memory):
-        away = _share_of_tolerance(z, cells, team)
+    _watch_axes(sample, cell, cells, team, plant, nominal, departures, memory, z, figures)
+    _watch_distances(cell, cells, plant, room, figures)
+    _watch_efforts(team, nominal, memory, room.before, figures)
+    if cell + 1 == cells.rows.shape[0] and left_by_all(cell, memory.channels):
+        away = _share_of_tolerance(z, cells.places, cells.rooms, team.first)
         end(figures, ARRIVED if away <= 1.0 else ASTRAY, away)
     elif time > cells.numbers[cell, 2]:
         end(figures, STALLED, time)
@@ -153,19 +125,19 @@ def watch(
         end(figures, LATE, time)
 
 
-@compiled(borrows=True)
-def _watch_cell(
-    sample: int, cell: int, cells: LoopCells, plant: LoopPlant, nominal: LoopNominal,
-    departures: LoopDepartures, memory: LoopMemory, room: WatchRoom, figures: FloatArray,
+@compiled(inlined=True, borrows=True)
+def _watch_axes(
+    sample: int, cell: int, cells: LoopCells, team: FusedTeam, plant: LoopPlant, nominal: LoopNominal,
+    departures: LoopDepartures, memory: LoopMemory, z: FloatArray, figures: FloatArray,
 ) -> None:  # fmt: skip
-    """Measure distances to funnels, slices and the cell's boundary, and end the run where one is negative.
+    """Measure distances of axes to funnels and slices, and the departures of all from their nominal motions.
 
     An axis uses the least distance to its funnel's bounds that the budget states over the one that it keeps.
+    The run ends where a distance is not positive.
     """
-    z = room.z
     for i in range(z.size - 2):
         now = sample * departures.times[0]
-        heard, time = heard_cell(plant.axis_rows[1, i], sample, now, departures, memory)
+        heard, time = heard_cell(plant.axis_rows[1, i], sample, now, departures.hearing, memory.current)
         bounds = bounds_of(cells.tables[heard, plant.axis_rows[0, i]], time)
         margin = min(z[2 + i] - bounds[0], bounds[1] - z[2 + i])
         if margin < figures[FUNNEL]:
@@ -178,45 +150,6 @@ def _watch_cell(
         margin = min(z[2 + i] - lower, upper - z[2 + i])
         if not margin > 0.0:
             end(figures, OUT_OF_SLICE, margin, i)
-    _watch_region(cell, z[0], z[1], cells, room.region, figures)
-
-
-@compiled(borrows=True)
-def _watch_region(
-    cell: int, x: float, y: float, cells: LoopCells, last: FloatArray, figures: FloatArray
-) -> None:
-    """Measure the distance to the cell's boundary, unless the way since the last time is too short.
-
-    It then cannot have become the smallest one. ``last`` is the ``region`` of a ``WatchRoom``.
-    """
-    if last[0] == cell and last[1] - hypot(x - last[2], y - last[3]) > figures[REGION] + ROUNDING:
-        return
-    edges = cells.regions[cells.first[1, cell] : cells.first[1, cell + 1]]
-    inside = signed_distance(edges, x, y)
-    last[0], last[1], last[2], last[3] = cell, inside, x, y
-    figures[REGION] = min(figures[REGION], inside)
-    if not inside > 0.0:
-        end(figures, OUT_OF_REGION, inside)
-
-
-@compiled(borrows=True)
-def watch_distances(z: FloatArray, plant: LoopPlant, last: Clearances, figures: FloatArray) -> None:
-    """Measure clearances, and end the run where one is not positive."""
-    travel(z, plant.reach, last)
-    figures[WALL] = smallest_to_walls(z, plant.shapes, plant.walls, last, figures[WALL])
-    figures[BODY] = smallest_apart(z, plant.shapes, last, figures[BODY])
-    if not figures[WALL] > 0.0:
-        end(figures, AT_WALL, figures[WALL])
-    if not figures[BODY] > 0.0:
-        end(figures, AT_BODY, figures[BODY])
-
-
-@compiled(borrows=True)
-def _watch_departures(
-    sample: int, cell: int, z: FloatArray, team: FusedTeam, plant: LoopPlant, nominal: LoopNominal,
-    memory: LoopMemory, figures: FloatArray,
-) -> None:  # fmt: skip
-    """Measure how far position, velocity, axes and their rates are from their nominal motions."""
     if not nominal.flow.size:
         return
     led = memory.nominal[sample % memory.nominal.shape[0]]
@@ -231,6 +164,55 @@ def _watch_departures(
             _use(abs(rate - axes[1, row]) / nominal.distances[2, cell, i], figures)
 
 
+@compiled(inlined=True, borrows=True)
+def _watch_distances(
+    cell: int, cells: LoopCells, plant: LoopPlant, room: WatchRoom, figures: FloatArray
+) -> None:
+    """Measure the distance to the cell's boundary and clearances; the run ends where one is not positive."""
+    z, last, way, team = room.z, room.region, room.way, plant.shapes
+    x, y = z[0], z[1]
+    if not (last[0] == cell and last[1] - hypot(x - last[2], y - last[3]) > figures[REGION] + ROUNDING):
+        edges = cells.regions[cells.first[1, cell] : cells.first[1, cell + 1]]
+        inside = signed_distance(edges, x, y)
+        last[0], last[1], last[2], last[3] = cell, inside, x, y
+        figures[REGION] = min(figures[REGION], inside)
+        if not inside > 0.0:
+            end(figures, OUT_OF_REGION, inside)
+    between = 0.0
+    for i in range(1, plant.reach.size):
+        between += plant.reach[i] * abs(z[2 + i] - room.last_z[2 + i])
+    moved = hypot(x - room.last_z[0], y - room.last_z[1]) + plant.reach[0] * abs(z[2] - room.last_z[2])
+    moved += between
+    if moved >= 0.0:  # Not NaN: there was a configuration before.
+        way[0] += moved
+        way[1] += 2.0 * between
+    for i in range(z.size):
+        room.last_z[i] = z[i]
+    placed = False
+    for i in range(len(team.pieces)):
+        if room.walls[i, 0] - (way[0] - room.walls[i, 1]) > figures[WALL] + ROUNDING:
+            continue
+        if not placed:
+            place_pieces(team, z, room.poses, room.vertices, room.discs)
+            placed = True
+        distance = piece_to_walls(team, room.vertices, room.discs, plant.walls, i, inf)
+        room.walls[i, 0], room.walls[i, 1] = distance, way[0]
+        figures[WALL] = min(figures[WALL], distance)
+    for i in range(len(team.pairs)):
+        if room.pairs[i, 0] - (way[1] - room.pairs[i, 1]) > figures[BODY] + ROUNDING:
+            continue
+        if not placed:
+            place_pieces(team, z, room.poses, room.vertices, room.discs)
+            placed = True
+        distance = pair_apart(team, room.vertices, room.discs, i, inf)
+        room.pairs[i, 0], room.pairs[i, 1] = distance, way[1]
+        figures[BODY] = min(figures[BODY], distance)
+    if not figures[WALL] > 0.0:
+        end(figures, AT_WALL, figures[WALL])
+    if not figures[BODY] > 0.0:
+        end(figures, AT_BODY, figures[BODY])
+
+
 @compiled(borrows=True)
 def _use(share: float, figures: FloatArray) -> None:
     """Note which share was used of what the plan's budget states."""
@@ -238,13 +220,16 @@ def _use(share: float, figures: FloatArray) -> None:
         figures[SHARE] = share
 
 
-@compiled(borrows=True)
-def _watch_efforts(team: FusedTeam, memory: LoopMemory, before: FloatArray, figures: FloatArray) -> None:
-    """Measure forces and torques of the bases, and the largest effort of a joint.
+@compiled(inlined=True, borrows=True)
+def _watch_efforts(
+    team: FusedTeam, nominal: LoopNominal, memory: LoopMemory, before: FloatArray, figures: FloatArray
+) -> None:
+    """Measure efforts of all robots, the object's rotation, and what the robots' monitors say.
 
-    ``before`` holds what it held at the last sample, and receives the forces of now, see ``WatchRoom``.
+    The run ends where a robot asks for a hold, which this loop lacks; the one that departs most is named.
+    ``before`` holds what it held at the last sample, and receives what there is now, see ``WatchRoom``.
     """
-    robots = team.yaws.size
+    robots, asked, most = team.yaws.size, False, 0
     for k in range(robots):
         own = 3 * k + team.first[2, k]
         x, y = memory.efforts[1, own], memory.efforts[1, own + 1]
@@ -258,51 +243,43 @@ def _watch_efforts(team: FusedTeam, memory: LoopMemory, before: FloatArray, figu
         before[2 * k], before[2 * k + 1] = x, y
         for i in range(team.first[2, k + 1] - team.first[2, k]):
             figures[EFFORT] = max(figures[EFFORT], abs(memory.efforts[1, own + 3 + i]))
-
-
-@compiled(borrows=True)
-def _watch_rotation(rate: float, before: FloatArray, figures: FloatArray) -> None:
-    """Measure the largest change of the object's rate of rotation [rad/s] from sample to sample."""
-    turn = abs(rate - before[-1])
-    if turn > figures[TURN]:
-        figures[TURN] = turn
-    before[-1] = rate
-
-
-@compiled(borrows=True)
-def _watch_alarms(nominal: LoopNominal, memory: LoopMemory, figures: FloatArray) -> None:
-    """End the run where a robot asks for a hold, which this loop lacks; name the one that departs most."""
-    asked, most = False, 0
-    for k in range(memory.alarms.shape[0]):
         if nominal.levels.size and not figures[ALARM] > memory.alarms[k, 1]:
             figures[ALARM] = memory.alarms[k, 1]
         asked = asked or memory.alarms[k, 0] > 0.0
         if memory.alarms[k, 1] > memory.alarms[most, 1]:
             most = k
+    rate = memory.state[team.places[1, 2]]
+    turn = abs(rate - before[-1])
+    if turn > figures[TURN]:
+        figures[TURN] = turn
+    before[-1] = rate
     if asked and figures[ENDED] == RUNS:
         figures[ROBOT] = most
         end(figures, HELD, memory.alarms[most, 1], int(memory.alarms[most, 2]))
 
 
 @compiled(borrows=True)
-def left_by_all(cell: int, memory: LoopMemory) -> bool:
+def left_by_all(cell: int, channels: FloatArray) -> bool:
     """Whether the reports heard say that all robots are ready to leave a cell, as the cell planner judges."""
-    for k in range(memory.channels.shape[0]):
-        if memory.channels[k, 0, 0] != cell or not memory.channels[k, 0, 1] >= 0.0:
+    for k in range(channels.shape[0]):
+        if channels[k, 0, 0] != cell or not channels[k, 0, 1] >= 0.0:
             return False
     return True
 
 
 @compiled(borrows=True)
-def _share_of_tolerance(z: FloatArray, cells: LoopCells, team: FusedTeam) -> float:
-    """Return how far object and joints are off the goal over what is tolerated, whatever was measured [-]."""
+def _share_of_tolerance(z: FloatArray, places: FloatArray, rooms: FloatArray, first: IntArray) -> float:
+    """Return how far object and joints are off the goal over what is tolerated, whatever was measured [-].
+
+    The other arguments are fields of ``LoopCells`` and of ``FusedTeam``.
+    """
     largest = 0.0
-    for k in range(team.yaws.size):
-        own, first = 3 * k + team.first[2, k], 2 * k + team.first[2, k]
-        place, room = cells.places[own:], cells.rooms[0, first:]
+    for k in range(first.shape[1] - 1):
+        own, row, n = 3 * k + first[2, k], 2 * k + first[2, k], first[2, k + 1] - first[2, k]
+        place, room = places[own:], rooms[0, row:]
         largest = max(
             largest, hypot(z[0] - place[0], z[1] - place[1]) / room[0], abs(z[2] - place[2]) / room[1]
         )
-        for i in range(team.first[2, k + 1] - team.first[2, k]):
-            largest = max(largest, abs(z[3 + team.first[2, k] + i] - place[3 + i]) / room[2 + i])
+        for i in range(n):
+            largest = max(largest, abs(z[3 + first[2, k] + i] - place[3 + i]) / room[2 + i])
     return largest

@@ -194,10 +194,10 @@ def track_axes(
         acceleration: Receives theta'' and q_k'', shape (1 + n,) [rad/s^2 or m/s^2].
     """
     n, left = table.shape[0] - 1, fading(time, table[0, FADING_TIME])
-    _write_accelerations(table, time, clock, object_state, robot, acceleration)
     for i in range(1 + n):
         rate = object_state[5] if i == 0 else robot[5 + n + i]
-        acceleration[i] = limited_row(table[i], acceleration[i] + left * jumps[i], rate)
+        asked = _acceleration(i, table, time, clock, object_state, robot) + left * jumps[i]
+        acceleration[i] = limited_row(table[i], asked, rate)
 
 
 @compiled(borrows=True)
@@ -217,24 +217,17 @@ def limited_row(row: FloatArray, acceleration: float, rate: float) -> float:
 
 
 @compiled(borrows=True)
-def _write_accelerations(
-    table: FloatArray,
-    time: float,
-    clock: FloatArray,
-    object_state: FloatArray,
-    robot: FloatArray,
-    acceleration: FloatArray,
-) -> None:
-    """Write what the funnels' law asks for, without jumps and limits; arguments as in ``track_axes``."""
-    n = table.shape[0] - 1
-    tau, pace, pace_rate = time - clock[0], clock[1], clock[2]
-    acceleration[0] = track_paced_row(table[0], tau, pace, pace_rate, object_state[2], object_state[5])[0]
-    for i in range(n):
-        x, v = robot[3 + i], robot[6 + n + i]
-        acceleration[1 + i] = track_paced_row(table[1 + i], tau, pace, pace_rate, x, v)[0]
+def _acceleration(
+    i: int, table: FloatArray, time: float, clock: FloatArray, object_state: FloatArray, robot: FloatArray
+) -> float:
+    """Return what the funnels' law asks of axis i, without jumps and limits; arguments of ``track_axes``."""
+    x, v = object_state[2], object_state[5]
+    if i > 0:
+        x, v = robot[2 + i], robot[4 + table.shape[0] + i]
+    return track_paced_row(table[i], time - clock[0], clock[1], clock[2], x, v)[0]
 
 
-@compiled
+@compiled(borrows=True)
 def write_jumps(
     table: FloatArray,
     next_table: FloatArray,
@@ -258,12 +251,12 @@ def write_jumps(
         robot: (z_k, z_k'), shape (2 (3 + n),); not read where the robot has no joints.
         jumps: Receives the law of the current cell less that of the next, shape (1 + n,).
     """
-    following = np.empty(table.shape[0])
-    _write_accelerations(table, time, clock, object_state, robot, jumps)
-    _write_accelerations(next_table, clock[0], clock, object_state, robot, following)
     for i in range(table.shape[0]):
-        at_rest = table[i, REST_RATE] > 0.0
-        jumps[i] = rest_jump(table[i], next_table[i]) if at_rest else jumps[i] - following[i]
+        if table[i, REST_RATE] > 0.0:
+            jumps[i] = rest_jump(table[i], next_table[i])
+        else:
+            now = _acceleration(i, table, time, clock, object_state, robot)
+            jumps[i] = now - _acceleration(i, next_table, clock[0], clock, object_state, robot)
 
 
 @compiled(borrows=True)

@@ -19,33 +19,29 @@ joint's coordinate and its rate stand in the state [-] (for the root, the first 
 centre of mass [m], inertia about it [kg m^2]; damping [N s/m or N m s] and inertia [kg or kg m^2] that the
 joint itself adds."""
 
-MOTION_COLUMNS = 12
-COS, SIN, PX, PY, VX, VY, W, AX, AY, ALPHA, UX, UY = range(MOTION_COLUMNS)
+MOTION_COLUMNS = 15
+COS, SIN, PX, PY, VX, VY, W, AX, AY, ALPHA, UX, UY, FX, FY, TORQUE = range(MOTION_COLUMNS)
 """Columns of the motion of a chain: cosine and sine of a row's angle [-], position of its reference point
 relative to the root's origin [m], its velocity [m/s] and angular rate [rad/s], its acceleration [m/s^2] and
-angular acceleration [rad/s^2], and the direction in which its joint slides [-], all in W."""
+angular acceleration [rad/s^2], the direction in which its joint slides [-], and the force [N] and the torque
+[N m] on it from its parent, about its reference point, all in W."""
 
 
-@compiled
-def move_chain(chain: FloatArray, state: FloatArray) -> FloatArray:
-    """Return the motion of every row's reference point relative to the root's origin, in W.
-
-    Args:
-        chain: The chain, shape (links + 1, ``COLUMNS``).
-        state: Holds the positions and the rates of the root, (x, y, yaw), and of the joints.
-
-    Returns:
-        (cos, sin, x, y, x', y', w) of every row, room for (x'', y'', w'), and the direction in which the
-        row's joint slides, shape (links + 1, 12) [m, m/s, rad/s].
-    """
-    motion = np.empty((chain.shape[0], MOTION_COLUMNS))
-    write_motion(chain, state, motion)
-    return motion
+def motion_room(chain: FloatArray) -> FloatArray:
+    """Return room for the motion of a chain, which compiled functions take so that they need not make it."""
+    return np.empty((chain.shape[0], MOTION_COLUMNS))
 
 
 @compiled(borrows=True)
 def write_motion(chain: FloatArray, state: FloatArray, motion: FloatArray) -> None:
-    """Write what ``move_chain`` returns, given the same arguments."""
+    """Write the motion of every row's reference point relative to the root's origin, in W.
+
+    Args:
+        chain: The chain, shape (links + 1, ``COLUMNS``).
+        state: Holds the positions and the rates of the root, (x, y, yaw), and of the joints.
+        motion: Receives (cos, sin, x, y, x', y', w) of every row, and the direction in which its joint
+            slides, in their columns, shape (links + 1, ``MOTION_COLUMNS``) or with more rows [m, m/s, rad/s].
+    """
     yaw = state[int(chain[0, POSITION]) + 2]
     motion[0, COS], motion[0, SIN] = np.cos(yaw), np.sin(yaw)
     motion[0, PX], motion[0, PY], motion[0, VX], motion[0, VY] = 0.0, 0.0, 0.0, 0.0

@@ -25,7 +25,7 @@ from __future__ import annotations
 from math import atan2, cos, hypot, inf, sin
 
 from coop_drake.jit import compiled
-from coop_drake.laws.chain_motion import PX, PY, move_chain
+from coop_drake.laws.chain_motion import PX, PY, write_motion
 from coop_drake.laws.load_sharing import rotated
 from coop_drake.laws.sampling import whole_periods
 from coop_drake.tree.pose import FloatArray
@@ -103,10 +103,11 @@ def axis_level(alarm: float, reserve: float, position: float, lower: float, uppe
     return min(alarm, min(position - lower, upper - position) - reserve)
 
 
-@compiled
+@compiled(borrows=True)
 def largest_departure(
-    chain: FloatArray, p_LE: FloatArray, mounting: FloatArray, robot: FloatArray, seen: FloatArray,
-    led: FloatArray, axes: FloatArray, levels: FloatArray, axis_levels: FloatArray, unseen: float,
+    chain: FloatArray, p_LE: FloatArray, mounting: FloatArray, motion: FloatArray, robot: FloatArray,
+    seen: FloatArray, led: FloatArray, axes: FloatArray, levels: FloatArray, axis_levels: FloatArray,
+    unseen: float,
 ) -> tuple[float, int]:  # fmt: skip
     """Return the largest measured departure over its level [-], and the number of this level.
 
@@ -117,6 +118,7 @@ def largest_departure(
         chain: From the robot's base to its end effector.
         p_LE: The grasp in L, shape (2,) or longer [m].
         mounting: See ``place_on_axes``, shape (1 + n,).
+        motion: Room for the chain's motion, see ``motion_room``.
         robot: (z_k, z_k') as measured, shape (2 (3 + n),).
         seen: What ``estimate_object`` makes of it and of the measured pose, shape (6,).
         led: p^ and p^' when this was measured, shape (4,) or longer.
@@ -127,7 +129,8 @@ def largest_departure(
         unseen: t, how far ahead that is [s].
     """
     largest, which, n = 0.0, POSITION, mounting.size - 1
-    motion, last = move_chain(chain, robot), chain.shape[0] - 1
+    last = chain.shape[0] - 1
+    write_motion(chain, robot, motion)
     rx, ry = rotated(cos(seen[2]), sin(seen[2]), p_LE[0], p_LE[1])
     turn = robot[2] - seen[2] - mounting[0]
     for i in range(n):

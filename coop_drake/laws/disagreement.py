@@ -8,7 +8,7 @@ import numpy as np
 
 from coop_drake.jit import compiled
 from coop_drake.laws.team_chain import frames_of, team_chain
-from coop_drake.laws.team_dynamics import team_accelerations, team_work
+from coop_drake.laws.team_dynamics import TeamWork, team_accelerations, team_work
 from coop_drake.tree.bodies import Bodies
 from coop_drake.tree.component_tree import ComponentTree
 from coop_drake.tree.pose import FloatArray, IntArray
@@ -39,7 +39,8 @@ def disagreement_coupling(
     places = np.array([frames[int(body[0])].apply(np.array(body[2:4])) for body in moved])
     masses = np.array([body[1] for body in moved])
     squares = np.zeros((len(joints), 1 + joints.shape[1]))
-    _add_squares(chain, (owners, links), places, masses, np.ascontiguousarray(joints), squares)
+    configurations = np.ascontiguousarray(joints)
+    _add_squares(chain, (owners, links), places, masses, configurations, team_work(chain), squares)
     coupling: FloatArray = np.sqrt(squares)
     return coupling
 
@@ -51,6 +52,7 @@ def _add_squares(
     places: FloatArray,
     masses: FloatArray,
     joints: FloatArray,
+    work: TeamWork,
     squares: FloatArray,
 ) -> None:
     """Add the squares of W_k along x and y for all robots k.
@@ -62,11 +64,12 @@ def _add_squares(
             (bodies, 2) [m].
         masses: Their masses, shape (bodies,) [kg].
         joints: Configurations, shape (configurations, n) [rad or m].
+        work: Room.
         squares: Receives the sums, shape (configurations, 1 + n) [rad^2/m^2 or -].
     """
     owners, links = of_bodies
     n = joints.shape[1] + 3
-    state, efforts, work = np.zeros(2 * n), np.zeros(n), team_work(chain)
+    state, efforts = np.zeros(2 * n), np.zeros(n)
     found, wrenches = np.empty(n), np.zeros((masses.size, 3))
     for c in range(joints.shape[0]):
         state[3:n] = joints[c]

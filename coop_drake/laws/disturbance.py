@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from coop_drake.jit import compiled
 from coop_drake.tree.pose import FloatArray
 
 PHASE = 0.15
@@ -27,7 +26,6 @@ def observer_gains(age: float) -> tuple[float, float]:
     return gain, LEAK * gain
 
 
-@compiled(borrows=True)
 def observe(
     rates: FloatArray,
     wanted: FloatArray,
@@ -55,7 +53,6 @@ def observe(
         state_rate: Receives z', shape (m,).
         disturbance: Receives d^, shape (m,) [m/s^2 or rad/s^2].
     """
-    for i in range(rates.size):
-        ahead = rates[i] - state[i]
-        state_rate[i] = wanted[i] + leak * ahead
-        disturbance[i] = gain * ahead
+    ahead = rates - state
+    state_rate[:] = wanted + leak * ahead
+    disturbance[:] = gain * ahead

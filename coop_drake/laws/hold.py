@@ -14,7 +14,7 @@ Delta E does not become negative.
 
 from __future__ import annotations
 
-import numpy as np
+from math import exp
 
 from coop_drake.jit import compiled
 from coop_drake.tree.pose import FloatArray
@@ -27,7 +27,6 @@ SETTLING_TIME = 1.0
 """So long after a hold the clock's pace is 1 for all purposes [s]: at 10 / omega, b is below a thousandth."""
 
 
-@compiled(borrows=True)
 def lagging_clock(time: float, held: float, start: FloatArray) -> tuple[float, float, float, float]:
     """Return a, b, b' and the time that the clock loses, in closed form while h is constant.
 
@@ -39,7 +38,7 @@ def lagging_clock(time: float, held: float, start: FloatArray) -> tuple[float, f
     Returns:
         a [-], b [-], b' [1/s] and the time lost [s].
     """
-    left = np.exp(-HOLD_RATE * time)
+    left = exp(-HOLD_RATE * time)
     first, second = start[0] - held, start[1] - held
     a = held + first * left
     b = held + (second + HOLD_RATE * time * first) * left

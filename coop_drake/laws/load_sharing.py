@@ -102,7 +102,6 @@ def end_effector_command(
     )
 
 
-@compiled
 def total_wrench(wrenches: FloatArray, grasps: FloatArray, p_LLcm: FloatArray, angle: float) -> FloatArray:
     """Return the sum of wrenches about the object's centre of mass in W, shape (3,) [N, N m].
 
@@ -114,10 +113,7 @@ def total_wrench(wrenches: FloatArray, grasps: FloatArray, p_LLcm: FloatArray, a
     """
     c, s, total = cos(angle), sin(angle), np.zeros(3)
     mx, my = rotated(c, s, p_LLcm[0], p_LLcm[1])
-    for k in range(wrenches.shape[0]):
-        rx, ry = rotated(c, s, grasps[k, 0], grasps[k, 1])
-        fx, fy = wrenches[k, 0], wrenches[k, 1]
-        total[0] += fx
-        total[1] += fy
-        total[2] += wrenches[k, 2] + (rx - mx) * fy - (ry - my) * fx
+    for (fx, fy, torque), grasp in zip(wrenches.tolist(), grasps.tolist(), strict=True):
+        rx, ry = rotated(c, s, *grasp)
+        total += fx, fy, torque + (rx - mx) * fy - (ry - my) * fx
     return total

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from coop_drake.jit import compiled
+from coop_drake.laws.chain_motion import motion_room
 from coop_drake.laws.load_sharing import end_effector_command
 from coop_drake.laws.robot_dynamics import base_acceleration, estimate_object
 from coop_drake.tree.pose import FloatArray
 
 
-@compiled
 def predict(
     chain: FloatArray,
     p_LE: FloatArray,
@@ -38,20 +37,16 @@ def predict(
         predicted_pose: Receives the object's pose, shape (3,).
     """
     state, n = np.empty(6), robot.size // 2
-    estimate_object(chain, p_LE, robot, pose, state)
+    estimate_object(chain, p_LE, motion_room(chain), robot, pose, state)
     predicted[:] = robot
     for row in accelerations:
-        for i in range(3):
-            state[i] += period * (state[3 + i] + 0.5 * period * row[i])
-            state[3 + i] += period * row[i]
-        for i in range(n):
-            predicted[i] += period * (predicted[n + i] + 0.5 * period * row[3 + i])
-            predicted[n + i] += period * row[3 + i]
-    for i in range(3):
-        predicted_pose[i] = state[i]
+        state[:3] += period * (state[3:] + 0.5 * period * row[:3])
+        state[3:] += period * row[:3]
+        predicted[:n] += period * (predicted[n:] + 0.5 * period * row[3:])
+        predicted[n:] += period * row[3:]
+    predicted_pose[:] = state[:3]
 
 
-@compiled
 def wanted_accelerations(
     chain: FloatArray,
     load: FloatArray,
@@ -72,10 +67,9 @@ def wanted_accelerations(
         axes: Desired accelerations of the object's angle and of the joints, shape (1 + n,).
         accelerations: Receives those of the object (3), of the base (3) and of the joints (n).
     """
-    state, command = np.empty(6), np.empty(6)
-    estimate_object(chain, load[:2], robot, pose, state)
+    state, command, motion = np.empty(6), np.empty(6), motion_room(chain)
+    estimate_object(chain, load[:2], motion, robot, pose, state)
     end_effector_command(load, state, linear, axes, command)
-    accelerations[0], accelerations[1], accelerations[2] = linear[0], linear[1], axes[0]
-    accelerations[3], accelerations[4], accelerations[5] = base_acceleration(chain, robot, command, axes)
-    for i in range(1, axes.size):
-        accelerations[5 + i] = axes[i]
+    accelerations[:2], accelerations[2] = linear, axes[0]
+    accelerations[3:6] = base_acceleration(chain, motion, robot, command, axes)
+    accelerations[6:] = axes[1:]

@@ -33,17 +33,19 @@ def rate_terms(
     """
     chain, axes = team_chain(tree, bodies, rotors), 1 + joints.shape[1]
     coefficients = np.zeros((len(joints), axes, axes, axes))
-    _write_coefficients(chain, np.ascontiguousarray(joints), coefficients)
+    _write_coefficients(chain, np.ascontiguousarray(joints), team_work(chain), coefficients)
     return coefficients
 
 
 @compiled
-def _write_coefficients(chain: FloatArray, joints: FloatArray, coefficients: FloatArray) -> None:
+def _write_coefficients(
+    chain: FloatArray, joints: FloatArray, work: TeamWork, coefficients: FloatArray
+) -> None:
     """Write the sizes of all coefficients, by the accelerations at unit rates of one axis and of two."""
     axes = joints.shape[1] + 1
     n = axes + 2
     state, efforts, own = np.zeros(2 * n), np.zeros(n), np.empty((axes, n))
-    both, work = np.empty(n), team_work(chain)
+    both = np.empty(n)
     for c in range(joints.shape[0]):
         state[3:n] = joints[c]
         for j in range(axes):

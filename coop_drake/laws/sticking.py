@@ -80,6 +80,7 @@ class StickingRoom(NamedTuple):
         limits: f_i, infinite for blocked wheels and zero for what does not stick, shape (m,).
         chosen: 1 where f_i is the force, -1 where -f_i is, else 0, shape (m,).
         active: 1 for forces that are solved for, else 0, shape (m,).
+        first: First values of the pivots, shape (m,).
     """
 
     joints: FloatArray
@@ -93,19 +94,19 @@ class StickingRoom(NamedTuple):
     limits: FloatArray
     chosen: FloatArray
     active: FloatArray
+    first: FloatArray
 
 
-@compiled
 def sticking_room(links: int, robots: int) -> StickingRoom:
     """Return room for a tree of so many links and robots."""
     m = 3 * robots + links - 1
     return StickingRoom(
         np.zeros(links), np.empty(m), np.empty(m), np.empty(m), np.zeros((m, m)), np.empty((m, m)),
-        np.empty(m), np.empty(m), np.empty(m), np.empty(m), np.empty(m),
+        np.empty(m), np.empty(m), np.empty(m), np.empty(m), np.empty(m), np.empty(m),
     )  # fmt: skip
 
 
-@compiled
+@compiled(borrows=True)
 def stick(
     tree: FloatArray, bases: IntArray, places: FloatArray, blocked: FloatArray, friction: FloatArray,
     efforts: FloatArray, gravity: float, state: FloatArray, work: TeamWork, room: StickingRoom,
@@ -180,7 +181,7 @@ def _choose(room: StickingRoom) -> None:
                 room.pivots[i, j] = room.matrix[i, j]
                 if chosen[j] != 0.0:
                     found[i] -= room.matrix[i, j] * chosen[j] * room.limits[j]
-        _solve(room.pivots, found, room.active, room.limits)
+        _solve(room.pivots, found, room.active, room.limits, room.first)
         wrong = False
         for i in range(m):
             if chosen[i] != 0.0:
@@ -247,16 +248,17 @@ def _motion_of(
         second[3 * k + 2] = alpha + link[ALPHA]
 
 
-@compiled
-def _solve(matrix: FloatArray, vector: FloatArray, active: FloatArray, limits: FloatArray) -> None:
+@compiled(borrows=True)
+def _solve(
+    matrix: FloatArray, vector: FloatArray, active: FloatArray, limits: FloatArray, first: FloatArray
+) -> None:
     """Replace b by a solution of A x = b in the active entries, x being zero elsewhere.
 
     A is symmetric and positive semidefinite. Gauss-Jordan elimination takes the largest pivots first, as
-    shares of their first values, and ends where only rounding is left. Forces without a limit come before
-    the others.
+    shares of their first values, for which ``first`` is room, and ends where only rounding is left. Forces
+    without a limit come before the others.
     """
     m = vector.size
-    first = np.empty(m)
     for i in range(m):
         first[i] = matrix[i, i]
     limited = False

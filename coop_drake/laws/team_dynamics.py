@@ -65,7 +65,6 @@ class TeamWork(NamedTuple):
     still: FloatArray
 
 
-@compiled
 def team_work(tree: FloatArray) -> TeamWork:
     """Return room for a tree of the form that ``team_accelerations`` takes."""
     links = tree.shape[0]
@@ -112,7 +111,15 @@ def team_accelerations(
     write_motion(tree, state, motion)
     accelerate_chain(tree, state, work.still, motion)
     for i in range(tree.shape[0]):
-        _write_inertia(tree[i], motion[i], gravity, inertias[i], forces[i])
+        # Mass, first moments and inertia about the object's origin, and the force and torque there that are
+        # needed while no coordinate accelerates.
+        row, link = tree[i], motion[i]
+        ex, ey = rotated(link[COS], link[SIN], row[COM_X] - row[X], row[COM_Y] - row[Y])
+        cx, cy, mass, w = link[PX] + ex, link[PY] + ey, row[MASS], link[W]
+        inertias[i, 0], inertias[i, 1], inertias[i, 2] = mass, mass * cx, mass * cy
+        inertias[i, 3] = row[INERTIA] + mass * (cx * cx + cy * cy)
+        fx, fy = mass * (link[AX] - w * w * ex - gravity), mass * (link[AY] - w * w * ey)
+        forces[i, 0], forces[i, 1], forces[i, 2] = fx, fy, cx * fy - cy * fx
     for k in range(pushed.size):
         link = motion[pushed[k]]
         row = tree[pushed[k]]
@@ -142,22 +149,6 @@ def team_accelerations(
         accelerations[int(tree[0, RATE]) - size + i] = wanted[i]
     for i in range(1, tree.shape[0]):
         accelerations[int(tree[i, RATE]) - size] = wanted[2 + i]
-
-
-@compiled(borrows=True)
-def _write_inertia(
-    row: FloatArray, motion: FloatArray, gravity: float, inertia: FloatArray, force: FloatArray
-) -> None:
-    """Write mass, first moments and inertia of a link about the object's origin, and what it needs anyway.
-
-    That is the force and the torque about the origin while no coordinate accelerates.
-    """
-    ex, ey = rotated(motion[COS], motion[SIN], row[COM_X] - row[X], row[COM_Y] - row[Y])
-    cx, cy, mass, w = motion[PX] + ex, motion[PY] + ey, row[MASS], motion[W]
-    inertia[0], inertia[1], inertia[2] = mass, mass * cx, mass * cy
-    inertia[3] = row[INERTIA] + mass * (cx * cx + cy * cy)
-    fx, fy = mass * (motion[AX] - w * w * ex - gravity), mass * (motion[AY] - w * w * ey)
-    force[0], force[1], force[2] = fx, fy, cx * fy - cy * fx
 
 
 @compiled(borrows=True)

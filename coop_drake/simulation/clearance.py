@@ -1,18 +1,133 @@
-"""Distances of all bodies to the walls of the floor and to the bodies that they must not touch."""
+"""Exact signed distances of all bodies to the walls of the floor and to the bodies that they must not touch.
+
+A piece of a body is the hull of its vertices grown by a radius; distances are taken from the hulls, then the
+radii off.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import hypot, inf, sqrt
 
 import numpy as np
 from shapely import Polygon
 
 from coop_drake.errors import GeometryError
-from coop_drake.geometry.boundary import edges_of
-from coop_drake.simulation.step_kernels import team_distances
+from coop_drake.geometry.boundary import edges_of, signed_distance
+from coop_drake.geometry.distances import meets_ring, ring_holds, squared_distance, squared_ring_distance
+from coop_drake.jit import compiled
 from coop_drake.tree.component_tree import ComponentTree
-from coop_drake.tree.pose import FloatArray
-from coop_drake.tree.team_arrays import TeamArrays
+from coop_drake.tree.pose import FloatArray, IntArray
+from coop_drake.tree.team_arrays import TeamArrays, moved, place_into
+
+
+@compiled(borrows=True)
+def team_distances(
+    team: TeamArrays, walls: FloatArray, poses: FloatArray, vertices: FloatArray, discs: FloatArray,
+    z: FloatArray,
+) -> tuple[float, int, float, int]:  # fmt: skip
+    """Return the smallest distance to the walls and its piece, then that between bodies and its pair [m].
+
+    Depths are negative distances. Without a pair the distance between bodies is infinite.
+
+    Args:
+        team: The team.
+        walls: Edges (x0, y0, x1, y1) of the floor's rings, shape (E, 4) [m].
+        poses: This and the next two arguments are the room that the team gives.
+        vertices: Vertices of all pieces in W, shape (V, 2) [m].
+        discs: Discs (x, y, radius) in W that hold the pieces, shape (P, 3) [m].
+        z: (x, y, theta, q...), shape (3 + n,) [m, rad].
+    """
+    place_pieces(team, z, poses, vertices, discs)
+    wall, piece, between, pair = inf, 0, inf, 0
+    for i in range(len(team.pieces)):
+        distance = piece_to_walls(team, vertices, discs, walls, i, wall)
+        if distance < wall:
+            wall, piece = distance, i
+    for k in range(len(team.pairs)):
+        distance = pair_apart(team, vertices, discs, k, between)
+        if distance < between:
+            between, pair = distance, k
+    return wall, piece, between, pair
+
+
+@compiled(borrows=True)
+def place_pieces(
+    team: TeamArrays, z: FloatArray, poses: FloatArray, vertices: FloatArray, discs: FloatArray
+) -> None:
+    """Write where vertices and discs of all pieces are in W; arguments as in ``team_distances``."""
+    place_into(team, z, poses)
+    for i in range(len(team.pieces)):
+        c = team.pieces[i, 0]
+        x, y, cosine, sine = poses[c, 0], poses[c, 1], poses[c, 2], poses[c, 3]
+        discs[i, 0], discs[i, 1] = moved(x, y, cosine, sine, team.discs[i, 0], team.discs[i, 1])
+        discs[i, 2] = team.discs[i, 2]
+        for k in range(team.pieces[i, 1], team.pieces[i, 2]):
+            u, v = team.vertices[k, 0], team.vertices[k, 1]
+            vertices[k, 0], vertices[k, 1] = moved(x, y, cosine, sine, u, v)
+
+
+@compiled(borrows=True)
+def piece_to_walls(
+    team: TeamArrays, vertices: FloatArray, discs: FloatArray, walls: FloatArray, i: int, bound: float
+) -> float:
+    """Return the signed distance of piece i to the walls, or less if that is not below a bound [m].
+
+    The other arguments are those of ``team_distances``.
+    """
+    x, y, reach = discs[i, 0], discs[i, 1], discs[i, 2]
+    first, last = team.pieces[i, 1], team.pieces[i, 2]
+    middle = signed_distance(walls, x, y)
+    if middle - reach >= bound:
+        return middle - reach
+    # A piece that meets no wall is on the same side of all walls as the middle of its disc.
+    squared, outside = inf, middle < 0.0
+    for w in range(len(walls)):
+        x0, y0, x1, y1 = walls[w, 0], walls[w, 1], walls[w, 2], walls[w, 3]
+        if squared_distance(x, y, x0, y0, x1, y1) <= (reach + sqrt(squared)) ** 2:
+            outside = outside or meets_ring(vertices, first, last, x0, y0, x1, y1)
+            squared = squared_ring_distance(vertices, first, last, x0, y0, x1, y1, squared)
+    if not outside:
+        return sqrt(squared) - team.radii[i]
+    # The deepest vertex: of the piece outside the floor, or of a wall inside the piece.
+    depth = 0.0
+    for w in range(len(walls)):
+        x, y = walls[w, 0], walls[w, 1]
+        if ring_holds(vertices, first, last, x, y):
+            depth = max(depth, sqrt(squared_ring_distance(vertices, first, last, x, y, x, y, inf)))
+    for k in range(first, last):
+        depth = max(depth, -signed_distance(walls, vertices[k, 0], vertices[k, 1]))
+    return -depth - team.radii[i]
+
+
+@compiled(borrows=True)
+def pair_apart(team: TeamArrays, vertices: FloatArray, discs: FloatArray, k: int, bound: float) -> float:
+    """Return the signed distance of pair k, or less if that is not below a bound [m]."""
+    i, j = team.pairs[k, 0], team.pairs[k, 1]
+    apart = hypot(discs[i, 0] - discs[j, 0], discs[i, 1] - discs[j, 1]) - discs[i, 2] - discs[j, 2]
+    if apart >= bound:
+        return apart
+    return _between(vertices, team.pieces[i], team.pieces[j]) - team.radii[i] - team.radii[j]
+
+
+@compiled(borrows=True)
+def _between(vertices: FloatArray, one: IntArray, other: IntArray) -> float:
+    """Signed distance [m] of two hulls, rows of ``TeamArrays.pieces``; minus the deepest vertex's depth."""
+    squared, depth, overlap = inf, 0.0, False
+    before = other[2] - 1
+    for k in range(other[1], other[2]):
+        x, y, u, v = vertices[k, 0], vertices[k, 1], vertices[before, 0], vertices[before, 1]
+        before = k
+        overlap = overlap or meets_ring(vertices, one[1], one[2], u, v, x, y)
+        squared = squared_ring_distance(vertices, one[1], one[2], u, v, x, y, squared)
+        if ring_holds(vertices, one[1], one[2], x, y):
+            depth = max(depth, sqrt(squared_ring_distance(vertices, one[1], one[2], x, y, x, y, inf)))
+    for k in range(one[1], one[2]):
+        x, y = vertices[k, 0], vertices[k, 1]
+        if ring_holds(vertices, other[1], other[2], x, y):
+            overlap = True
+            depth = max(depth, sqrt(squared_ring_distance(vertices, other[1], other[2], x, y, x, y, inf)))
+    return -depth if overlap else sqrt(squared)
 
 
 @dataclass(frozen=True)
@@ -45,12 +160,9 @@ class TeamClearance:
         ]
         if not self._names:
             raise GeometryError("the component tree has no body with a shape, so no clearance is defined")
-        self._arrays = tree.arrays, np.ascontiguousarray(edges_of(workspace))
-
-    @property
-    def kernel_arguments(self) -> tuple[TeamArrays, FloatArray]:
-        """The arguments of ``team_distances`` for this team and floor."""
-        return self._arrays
+        self.team, self.walls = tree.arrays, np.ascontiguousarray(edges_of(workspace))
+        #: The first arguments of ``team_distances`` for this team and floor.
+        self.kernel_arguments = self.team, self.walls, *self.team.room()
 
     def __call__(self, configuration: FloatArray) -> tuple[Clearance, Clearance]:
         """Return the smallest distance to the walls, and between bodies that must not touch.
@@ -58,7 +170,7 @@ class TeamClearance:
         Args:
             configuration: z = (x, y, theta, q...), shape (3 + n,) [m, rad].
         """
-        wall, piece, between, pair = team_distances(*self._arrays, configuration)
+        wall, piece, between, pair = team_distances(*self.kernel_arguments, configuration)
         return Clearance(wall, self.wall_place(piece)), Clearance(between, self.pair_place(pair))
 
     def wall_place(self, piece: int) -> str:
@@ -67,7 +179,7 @@ class TeamClearance:
 
     def pair_place(self, pair: int) -> str:
         """Return a phrase for the two sides of a pair's distance."""
-        pairs = self._arrays[0].pairs
+        pairs = self.team.pairs
         if not len(pairs):
             return "no two bodies"
         first, second = (self._names[piece] for piece in pairs[pair])

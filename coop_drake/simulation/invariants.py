@@ -4,17 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from math import inf
 from typing import NamedTuple
 
 import numpy as np
 
 from coop_drake.answers.plan import Plan
-from coop_drake.geometry.boundary import BoundaryDistance
-from coop_drake.simulation.clearance import TeamClearance
-from coop_drake.simulation.step_kernels import margins
-from coop_drake.simulation.telemetry import Sample
-
-__all__ = ["ACCELERATION_TOLERANCE", "GRASP_TOLERANCE", "WRENCH_TOLERANCE", "Invariants", "Margins"]
+from coop_drake.geometry.boundary import BoundaryDistance, signed_distance
+from coop_drake.jit import compiled
+from coop_drake.simulation.clearance import TeamClearance, team_distances
+from coop_drake.simulation.telemetry import Sample, largest_difference
+from coop_drake.tree.pose import FloatArray
+from coop_drake.tree.team_arrays import TeamArrays
 
 ACCELERATION_TOLERANCE = 1e-9
 """Largest difference between realised and commanded acceleration of the object [m/s^2, rad/s^2]: a hundred
@@ -28,6 +29,54 @@ constraint yields by some 1e-8 m for each newton."""
 WRENCH_TOLERANCE = 1e-8
 """Largest difference between a grasp's measured and commanded wrench [N, N m]: a hundred times the rounding
 errors."""
+
+
+@compiled(borrows=True)
+def margins(
+    team: TeamArrays, walls: FloatArray, poses: FloatArray, vertices: FloatArray, discs: FloatArray,
+    z: FloatArray, cell: FloatArray, lower: FloatArray, upper: FloatArray,
+    funnel_lower: FloatArray, funnel_upper: FloatArray, commanded: FloatArray, measured: FloatArray,
+) -> tuple[float, int, float, int, float, float, int, float, int, float]:  # fmt: skip
+    """Return what ``team_distances`` returns, then the margins of cell, funnels, slice and wrenches.
+
+    Args:
+        team: With the next five as in ``team_distances``.
+        walls: Of the floor.
+        poses: Room for poses.
+        vertices: Room for vertices.
+        discs: Room for discs.
+        z: The configuration.
+        cell: Edges of the cell's governed set, shape (edges, 4) [m].
+        lower: Of the cell's slice, shape (1 + n,) [rad or m].
+        upper: Of the cell's slice, shape (1 + n,) [rad or m].
+        funnel_lower: Lower funnel bounds, shape (1 + n,) [rad or m].
+        funnel_upper: Upper funnel bounds, shape (1 + n,) [rad or m].
+        commanded: Commanded wrenches of the end effectors, shape (N, 3) [N, N m].
+        measured: Wrenches that the grasps transmit, shape (N, 3) [N, N m].
+
+    Returns:
+        Distances; signed distance of the object to its cell's boundary [m]; smallest margin to a funnel and
+        the axis; smallest margin to the slice and the axis; largest difference of wrenches.
+    """
+    wall, piece, between, pair = team_distances(team, walls, poses, vertices, discs, z)
+    in_cell = signed_distance(cell, z[0], z[1])
+    funnel, funnel_axis = _narrowest(z, funnel_lower, funnel_upper)
+    margin, slice_axis = _narrowest(z, lower, upper)
+    error = largest_difference(measured, commanded)
+    return wall, piece, between, pair, in_cell, funnel, funnel_axis, margin, slice_axis, error
+
+
+@compiled(borrows=True)
+def _narrowest(z: FloatArray, lower: FloatArray, upper: FloatArray) -> tuple[float, int]:
+    """Return the smallest distance of an axis to its interval's ends, and the axis; NaN if one is NaN."""
+    least, axis = inf, 0
+    for i in range(lower.size):
+        margin = min(z[2 + i] - lower[i], upper[i] - z[2 + i])
+        if np.isnan(z[2 + i] - lower[i]) or np.isnan(upper[i] - z[2 + i]):
+            return np.nan, i
+        if margin < least:
+            least, axis = margin, i
+    return least, axis
 
 
 @dataclass(frozen=True)

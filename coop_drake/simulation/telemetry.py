@@ -8,8 +8,8 @@ import numpy as np
 from pydrake.systems.framework import Context
 
 from coop_drake.diagram.station import Loop, Places, PortRow
+from coop_drake.jit import compiled
 from coop_drake.laws import total_wrench
-from coop_drake.simulation.step_kernels import row_figures
 from coop_drake.tree.pose import FloatArray
 
 
@@ -71,6 +71,50 @@ class Sample:
     causes: FloatArray
     alarms: FloatArray
     arrived: bool
+
+
+@compiled
+def row_figures(
+    governors: FloatArray, accelerations: FloatArray, realised: FloatArray, energy_margins: FloatArray,
+    grasp_errors: FloatArray, clock_lags: FloatArray, causes: FloatArray,
+) -> tuple[float, float, float, float, float, float]:  # fmt: skip
+    """Return figures of one step for the log; one that rests on NaN is NaN.
+
+    Args:
+        governors: p_G as every robot keeps it, shape (N, 2) [m].
+        accelerations: Commanded accelerations of the object, shape (N, 3) [m/s^2, rad/s^2].
+        realised: Accelerations of z in the plant, shape (3 + n,).
+        energy_margins: Delta E of every robot, shape (N,) [m^2/s^2].
+        grasp_errors: Shape (N,) [m].
+        clock_lags: Lag of the funnels' clock [s], shape (1,), or (0,) where there is none.
+        causes: Why the team is held, see ``HoldSupervisor``; of shape (0,) where it never is.
+
+    Returns:
+        Largest differences of copies of p_G, and of commanded to realised acceleration; smallest Delta E;
+        largest error of a grasp; lag of the clock; 1 where the team is held, else 0.
+    """
+    spread = largest_difference(governors, governors[:1])
+    difference = largest_difference(accelerations, realised[:3].copy().reshape((1, 3)))
+    lag = clock_lags[0] if clock_lags.size else 0.0
+    return spread, difference, energy_margins.min(), grasp_errors.max(), lag, 1.0 * causes.any()
+
+
+@compiled(borrows=True)
+def largest_difference(rows: FloatArray, others: FloatArray) -> float:
+    """Return the largest magnitude of a component of a difference, NaN if a component is NaN.
+
+    Args:
+        rows: Shape (N, k).
+        others: Rows to compare with, shape (N, k), or (1, k) to compare all with the same row.
+    """
+    largest = 0.0
+    for i in range(rows.shape[0]):
+        for k in range(rows.shape[1]):
+            difference = abs(rows[i, k] - others[i % others.shape[0], k])
+            if np.isnan(difference):
+                return np.nan
+            largest = max(largest, difference)
+    return largest
 
 
 class Telemetry:

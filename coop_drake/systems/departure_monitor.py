@@ -9,6 +9,7 @@ from functools import partial
 import numpy as np
 from pydrake.systems.framework import BasicVector, Context, DiscreteValues, EventStatus
 
+from coop_drake.laws.chain_motion import motion_room
 from coop_drake.laws.departure import alarm_at, axis_level, largest_departure
 from coop_drake.laws.robot_dynamics import estimate_object
 from coop_drake.systems.block import Block
@@ -81,8 +82,9 @@ class DepartureMonitor(Block):
         super().__init__()
         self._robot, self._axes = robot, robot.axis_alarms.shape[2]
         size = 2 * (2 + robot.mounting.size)
-        self._estimate = partial(estimate_object, robot.chain, robot.p_LE)
-        known = robot.chain, robot.p_LE, robot.mounting
+        motion = motion_room(robot.chain)
+        self._estimate = partial(estimate_object, robot.chain, robot.p_LE, motion)
+        known = robot.chain, robot.p_LE, robot.mounting, motion
         self._largest = partial(largest_departure, *known)
         self._state = self.DeclareVectorInputPort("robot_state", size)
         self._pose = self.DeclareVectorInputPort("object_pose", 3)

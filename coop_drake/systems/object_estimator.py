@@ -7,6 +7,7 @@ from functools import partial
 import numpy as np
 from pydrake.systems.framework import BasicVector, Context
 
+from coop_drake.laws.chain_motion import motion_room
 from coop_drake.laws.robot_dynamics import estimate_object
 from coop_drake.plant import RobotPlant, robot_chain
 from coop_drake.systems.block import Block
@@ -31,7 +32,8 @@ class ObjectEstimator(Block):
 
     def __init__(self, robot: RobotPlant, p_LE: FloatArray) -> None:
         super().__init__()
-        known = robot_chain(robot), np.array(p_LE, dtype=float)
+        chain = robot_chain(robot)
+        known = chain, np.array(p_LE, dtype=float), motion_room(chain)
         self._estimate = partial(estimate_object, *known)
         self._state = self.DeclareVectorInputPort("robot_state", 2 * (3 + len(robot.joints)))
         self._pose = self.DeclareVectorInputPort("object_pose", 3)

@@ -6,6 +6,7 @@ from functools import partial
 
 from pydrake.systems.framework import BasicVector, Context
 
+from coop_drake.laws.chain_motion import motion_room
 from coop_drake.laws.robot_dynamics import robot_effort
 from coop_drake.plant import RobotPlant, robot_chain
 from coop_drake.systems.block import Block
@@ -32,7 +33,8 @@ class RobotEffort(Block):
     def __init__(self, robot: RobotPlant) -> None:
         super().__init__()
         self._robot, self._springs = robot, robot.has_springs
-        self._effort = partial(robot_effort, robot_chain(robot))
+        chain = robot_chain(robot)
+        self._effort = partial(robot_effort, chain, motion_room(chain))
         self._size = size = 3 + len(robot.joints)
         self._state = self.DeclareVectorInputPort("robot_state", 2 * size)
         self._hand = self.DeclareVectorInputPort("hand_command", 6)

@@ -9,6 +9,7 @@ from pydrake.systems.framework import BasicVector, Context
 from pydrake.systems.primitives import Selector
 
 from coop_drake.jit import compiled
+from coop_drake.laws.chain_motion import motion_room
 from coop_drake.laws.robot_dynamics import read_robot
 from coop_drake.plant import SeparateTeam, TeamPlant, base_chain
 from coop_drake.systems.block import Block
@@ -19,7 +20,7 @@ from coop_drake.tree.pose import FloatArray, IntArray
 @compiled(borrows=True)
 def _read_team(
     pose: IntArray, first: IntArray, chains: FloatArray, yaws: FloatArray, first_joint: IntArray,
-    joints: IntArray, state: FloatArray, measured: FloatArray,
+    joints: IntArray, motion: FloatArray, state: FloatArray, measured: FloatArray,
 ) -> None:  # fmt: skip
     """Write the object's pose, then for every robot what ``read_robot`` writes.
 
@@ -30,6 +31,7 @@ def _read_team(
         yaws: Angles of the bases in the object where all joints are at zero, shape (N,) [rad].
         first_joint: As ``first``, of ``joints``.
         joints: Where all joints stand in the state, then where their rates do, shape (2, n).
+        motion: Room for the motion of the longest chain, see ``motion_room``.
         state: State of the team.
         measured: Receives all, shape (3 + 6 N + 2 n,).
     """
@@ -39,7 +41,7 @@ def _read_team(
     for k in range(yaws.size):
         own = joints[:, first_joint[k] : first_joint[k + 1]]
         end = at + 2 * (3 + own.shape[1])
-        read_robot(chains[first[k] : first[k + 1]], yaws[k], own, state, measured[at:end])
+        read_robot(chains[first[k] : first[k + 1]], yaws[k], own, motion, state, measured[at:end])
         at = end
 
 
@@ -69,6 +71,7 @@ class TeamSensor(Block):
             np.array([chain.yaw for chain in chains]),
             np.array([0, *np.cumsum([chain.joints.shape[1] for chain in chains])]),
             np.hstack([chain.joints for chain in chains]),
+            max((motion_room(chain.chain) for chain in chains), key=len),
         )
         self._read = partial(_read_team, *known)
         #: Sizes of the measurements' parts: the object's, then each robot's.

@@ -38,9 +38,10 @@ def read_own(
     first: IntArray,
     base_chains: FloatArray,
     yaws: FloatArray,
+    motion: FloatArray,
     state: FloatArray,
     robot: FloatArray,
 ) -> None:
-    """Write (z_k, z_k') of robot k, see ``read_robot``."""
+    """Write (z_k, z_k') of robot k, see ``read_robot``; ``motion`` is room for the longest chain's motion."""
     joints = places[:, 3 + first[2, k] : 3 + first[2, k + 1]]
-    read_robot(base_chains[first[1, k] : first[1, k + 1]], yaws[k], joints, state, robot)
+    read_robot(base_chains[first[1, k] : first[1, k + 1]], yaws[k], joints, motion, state, robot)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from math import hypot, inf, pi
+from math import cos, hypot, inf, pi, sin
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -201,15 +201,26 @@ class ComponentTree:
         return team_arrays(self)
 
     def poses(self, configuration: Sequence[float] | FloatArray) -> tuple[PlanarPose, ...]:
-        """Pose ``X_WC`` of every component.
+        """Pose ``X_WC`` of every component, the numbers of the compiled ``place``.
 
         Args:
             configuration: z = (x, y, theta, q...), shape (3 + n,) [m, rad].
         """
-        from coop_drake.tree.team_arrays import place
-
-        rows = place(self.arrays, np.ascontiguousarray(configuration, dtype=float))
-        return tuple(PlanarPose(x, y, angle) for x, y, _, _, angle in rows.tolist())
+        x, y, theta, *q = (float(value) for value in configuration)
+        poses: list[PlanarPose] = []
+        for component in self.components:
+            joint, parent = component.joint, component.parent
+            if joint is None or parent is None:
+                poses.append(PlanarPose(x, y, theta))
+                continue
+            X_PJ, value = poses[parent] @ joint.X_PJ, q[joint.index]
+            if joint.kind == "revolute":
+                poses.append(PlanarPose(X_PJ.x, X_PJ.y, X_PJ.angle + joint.sign * value))
+            else:
+                c, s, (ax, ay) = cos(X_PJ.angle), sin(X_PJ.angle), joint.axis
+                moved = X_PJ.x + (c * ax - s * ay) * value, X_PJ.y + (s * ax + c * ay) * value
+                poses.append(PlanarPose(*moved, X_PJ.angle))
+        return tuple(poses)
 
     @cached_property
     def reach(self) -> float:

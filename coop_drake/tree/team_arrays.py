@@ -38,6 +38,10 @@ class TeamArrays(NamedTuple):
     discs: FloatArray
     pairs: IntArray
 
+    def room(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return room for the poses of all components, and for vertices and discs of all pieces in W."""
+        return np.empty((len(self.links), 5)), np.empty(self.vertices.shape), np.empty(self.discs.shape)
+
 
 @compiled
 def moved(x: float, y: float, c: float, s: float, u: float, v: float) -> tuple[float, float]:

@@ -5,6 +5,7 @@ import pytest
 from pydrake.systems.framework import DiagramBuilder
 from scipy.integrate import solve_ivp
 
+from coop_drake.laws.chain_motion import motion_room
 from coop_drake.laws.nominal_axes import carry_axes, place_on_axes, pulled_axis
 from coop_drake.laws.robot_dynamics import read_robot
 from coop_drake.plant import base_chain, build_team_plant
@@ -40,7 +41,7 @@ def test_the_base_of_every_robot_turns_with_the_object_and_against_its_joints():
     axes = np.array([state[team.position_index[2:]], state[n + team.velocity_index[2:]]])
     for robot in team.robots:
         base, expected, found = base_chain(team, robot), np.empty(10), np.empty(10)
-        read_robot(base.chain, base.yaw, base.joints, state, expected)
+        read_robot(base.chain, base.yaw, base.joints, motion_room(base.chain), state, expected)
         own = np.ascontiguousarray(axes[:, [0, *range(1 + robot.q_slice.start, 1 + robot.q_slice.stop)]])
         found[[0, 1]], found[[5, 6]] = away, away
         place_on_axes(own, base.mounting, found)

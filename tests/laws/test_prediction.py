@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from coop_drake.laws.chain_motion import motion_room
 from coop_drake.laws.load_sharing import end_effector_command
 from coop_drake.laws.prediction import predict, wanted_accelerations
 from coop_drake.laws.robot_dynamics import base_acceleration, estimate_object, robot_effort
@@ -18,10 +19,10 @@ def test_the_base_accelerates_as_the_equations_say(joints):
     _, jacobian, rate_term = arm.end_effector(z, v)
     command, axes, effort = rng.normal(size=6), rng.normal(size=1 + joints), np.empty(3 + joints)
     robot = np.concatenate([z, v])
-    found = base_acceleration(arm.chain(), robot, command, axes)
+    found = base_acceleration(arm.chain(), motion_room(arm.chain()), robot, command, axes)
     expected = robot_acceleration(command[:3], axes[1:], jacobian=jacobian, jacobian_rate_term=rate_term)
     np.testing.assert_allclose(found, expected[:3], atol=1e-10)
-    robot_effort(arm.chain(), robot, command, axes, effort)
+    robot_effort(arm.chain(), motion_room(arm.chain()), robot, command, axes, effort)
     mass_matrix, bias = arm.dynamics(z, v)
     moved = np.linalg.solve(mass_matrix, effort - bias - jacobian.T @ command[3:])
     np.testing.assert_allclose(moved[:3], found, atol=1e-9)
@@ -35,7 +36,7 @@ def test_constant_accelerations_are_predicted_exactly(joints):
     rows = np.tile(rng.normal(size=6 + joints), (5, 1))
     predicted, predicted_pose, state, period = np.empty(robot.size), np.empty(3), np.empty(6), 0.02
     predict(arm.chain(), grasp, robot, pose, rows, period, predicted, predicted_pose)
-    estimate_object(arm.chain(), grasp, robot, pose, state)
+    estimate_object(arm.chain(), grasp, motion_room(arm.chain()), robot, pose, state)
     time, n = 5 * period, 3 + joints
     for found, x, rate, a in (
         (predicted[:n], z, v, rows[0, 3:]),
@@ -52,8 +53,10 @@ def test_what_is_kept_is_what_was_commanded():
     linear, axes, kept = rng.normal(size=2), rng.normal(size=3), np.empty(8)
     wanted_accelerations(arm.chain(), load, robot, pose, linear, axes, kept)
     state, command = np.empty(6), np.empty(6)
-    estimate_object(arm.chain(), load[:2], robot, pose, state)
+    estimate_object(arm.chain(), load[:2], motion_room(arm.chain()), robot, pose, state)
     end_effector_command(load, state, linear, axes, command)
     np.testing.assert_array_equal(kept[:3], [*linear, axes[0]])
-    np.testing.assert_array_equal(kept[3:6], base_acceleration(arm.chain(), robot, command, axes))
+    np.testing.assert_array_equal(
+        kept[3:6], base_acceleration(arm.chain(), motion_room(arm.chain()), robot, command, axes)
+    )
     np.testing.assert_array_equal(kept[6:], axes[1:])

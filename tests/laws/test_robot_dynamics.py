@@ -1,8 +1,9 @@
 import numpy as np
 import pytest
 
+from coop_drake.laws.chain_motion import motion_room
 from coop_drake.laws.load_sharing import end_effector_command
-from coop_drake.laws.robot_dynamics import frame_twist, robot_effort
+from coop_drake.laws.robot_dynamics import estimate_object, robot_effort
 from tests.support.planar_arm import random_arm, random_state
 from tests.support.robot_matrices import consistent_projector, grasp_matrix, robot_acceleration
 
@@ -32,12 +33,13 @@ def test_end_effector_and_joints_accelerate_as_asked(joints):
     _, jacobian, rate_term = arm.end_effector(z, v)
     mass_matrix, bias = arm.dynamics(z, v)
     command, axes, effort = rng.normal(size=6), rng.normal(size=1 + joints), np.empty(3 + joints)
-    robot = np.concatenate([z, v])
-    robot_effort(arm.chain(), robot, command, axes, effort)
+    robot, chain, seen = np.concatenate([z, v]), arm.chain(), np.empty(6)
+    robot_effort(chain, motion_room(chain), robot, command, axes, effort)
     acceleration = np.linalg.solve(mass_matrix, effort - bias - jacobian.T @ command[3:])
     assert jacobian @ acceleration + rate_term == pytest.approx(command[:3], abs=1e-10)
     assert acceleration[3:] == pytest.approx(axes[1:], abs=1e-10)
-    assert frame_twist(arm.chain(), robot) == pytest.approx(jacobian @ v)
+    estimate_object(chain, np.zeros(2), motion_room(chain), robot, np.zeros(3), seen)
+    assert seen[3:] == pytest.approx(jacobian @ v)
 
 
 @pytest.mark.parametrize("joints", [(1, 1), (2, 1, 3), (1, 0, 2, 1, 2)])
@@ -71,7 +73,7 @@ def test_the_team_moves_the_object_as_commanded_and_loads_every_grasp_by_its_sha
         load = np.array([*offset, *com_offset, mass, inertia, shares[k]])
         command, torque, axes = np.empty(6), np.empty(3 + n), np.array([wanted[2], *joint_wanted])
         end_effector_command(load, np.array([0.0, 0.0, 0.0, 0.0, 0.0, rate]), wanted[:2], axes, command)
-        robot_effort(arm.chain(), np.concatenate([z, v]), command, axes, torque)
+        robot_effort(arm.chain(), motion_room(arm.chain()), np.concatenate([z, v]), command, axes, torque)
         z_wanted = robot_acceleration(
             command[:3], joint_wanted, jacobian=jacobian, jacobian_rate_term=rate_term
         )

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from coop_drake.laws.chain_motion import motion_room
 from coop_drake.laws.robot_dynamics import robot_effort
 from paper import printed
 from tests.support.planar_arm import random_arm, random_state
@@ -63,7 +64,7 @@ def test_e33_task_space_forces_reach_the_actuators_through_the_transpose(joints)
         at_grasp, axes, torque = rng.normal(size=3), rng.normal(size=1 + joints), np.empty(3 + joints)
         wanted = robot_acceleration(at_grasp, axes[1:], jacobian=jacobian, jacobian_rate_term=rate_term)
         command = np.concatenate([at_grasp, wrench])
-        robot_effort(arm.chain(), np.concatenate([z, v]), command, axes, torque)
+        robot_effort(arm.chain(), motion_room(arm.chain()), np.concatenate([z, v]), command, axes, torque)
         # (2) solved for the acceleration, with the object pushing back.
         got = np.linalg.solve(mass_matrix, torque - bias - jacobian.T @ wrench)
         assert got == pytest.approx(wanted, abs=1e-9)

@@ -10,6 +10,7 @@ from shapely import box
 from coop_drake.answers.budget import Budget
 from coop_drake.answers.plan import Cell
 from coop_drake.diagram.robot_controller import RobotKnowledge
+from coop_drake.laws.chain_motion import motion_room
 from coop_drake.laws.disagreement import disagreement_coupling
 from coop_drake.laws.load_sharing import end_effector_command
 from coop_drake.laws.nominal_axes import place_on_axes
@@ -135,7 +136,7 @@ def test_no_effort_of_the_control_law_is_larger_than_its_parts(name, ring):
                 command, effort = np.empty(6), np.empty(3 + size)
                 load = RobotKnowledge.load.fget(_Load(case, robot))
                 end_effector_command(load, seen, wanted, accelerations[own], command)
-                robot_effort(chain, state, command, accelerations[own], effort)
+                robot_effort(chain, motion_room(chain), state, command, accelerations[own], effort)
                 k, N = robot.index, len(robots)
                 found = np.array([np.hypot(*effort[:2]), *np.abs(effort[2:])])
                 allowed = most[[k, N + k, *range(2 * N + robot.q_slice.start, 2 * N + robot.q_slice.stop)]]

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from pydrake.systems.framework import DiagramBuilder
 
-from coop_drake.laws.robot_dynamics import frame_twist, read_robot, robot_effort
+from coop_drake.laws.chain_motion import motion_room
+from coop_drake.laws.robot_dynamics import estimate_object, read_robot, robot_effort
 from coop_drake.plant import base_chain, build_team_plant, robot_chain
 from coop_drake.systems import RobotEffort
 from tests.support.ring_team import PRISMATIC, REVOLUTE, ring_team
@@ -38,13 +39,15 @@ def test_an_end_effector_moves_and_is_moved_as_in_drake(scenario, k):
     ):
         robot.set_state(*np.split(state, 2))
         jacobian = robot.grasp_jacobian()
-        np.testing.assert_allclose(frame_twist(chain, state), jacobian @ state[3 + n :], atol=1e-14)
+        seen, motion = np.empty(6), motion_room(chain)
+        estimate_object(chain, np.zeros(2), motion, state, np.zeros(3), seen)
+        np.testing.assert_allclose(seen[3:], jacobian @ state[3 + n :], atol=1e-14)
         acceleration = robot_acceleration(
             hand[:3], joints, jacobian=jacobian, jacobian_rate_term=robot.grasp_bias()
         )
         expected = robot.inertial_effort(acceleration) + hand[3:] @ jacobian
         effort = np.empty(3 + n)
-        robot_effort(chain, state, hand, np.array([9.0, *joints]), effort)
+        robot_effort(chain, motion, state, hand, np.array([9.0, *joints]), effort)
         np.testing.assert_allclose(effort, expected, atol=1e-13 * np.abs(expected).max())
 
 
@@ -58,7 +61,7 @@ def test_a_base_is_where_the_teams_plant_has_it(scenario):
             X_WB = robot.base_body.EvalPoseInWorld(context).GetAsMatrix34()
             V_WB = robot.base_body.EvalSpatialVelocityInWorld(context).get_coeffs()
             found = np.empty(2 * (3 + n))
-            read_robot(way.chain, way.yaw, way.joints, state, found)
+            read_robot(way.chain, way.yaw, way.joints, motion_room(way.chain), state, found)
             expected = [X_WB[0, 3], X_WB[1, 3], np.arctan2(X_WB[1, 0], X_WB[0, 0])]
             np.testing.assert_allclose(found[:3], expected, atol=1e-14)
             np.testing.assert_allclose(found[3 + n : 6 + n], V_WB[[3, 4, 2]], atol=1e-14)
@@ -80,5 +83,6 @@ def test_springs_of_a_model_are_held(tmp_path):
     expected = robot.inertial_effort(z) + hand[3:] @ jacobian
     np.testing.assert_allclose(effort, expected, atol=1e-13)
     without = np.empty(4)
-    robot_effort(robot_chain(robot), state, hand, np.array([9.0, *joints]), without)
+    chain = robot_chain(robot)
+    robot_effort(chain, motion_room(chain), state, hand, np.array([9.0, *joints]), without)
     assert effort[3] - without[3] == pytest.approx(2.0 * (state[3] - 0.4))

@@ -12,10 +12,10 @@ import numpy as np
 
 from coop_drake.answers.plan import Plan
 from coop_drake.compiled_loop import CompiledTransport, prepare
-from coop_drake.compiled_loop.looping import update
-from coop_drake.compiled_loop.robots import robot_room
+from coop_drake.compiled_loop.arrays import robot_room, watch_room
+from coop_drake.compiled_loop.loop import update
 from coop_drake.compiled_loop.running import departures_of, memory_of
-from coop_drake.compiled_loop.watching import begin_figures, watch, watch_room
+from coop_drake.compiled_loop.watching import begin_figures, watch
 from coop_drake.diagram import build_closed_loop
 from coop_drake.geometry.boundary import edges_of
 from coop_drake.laws import ScheduledGains
@@ -136,7 +136,7 @@ def compiled_results(transport: CompiledTransport):
         memory.state[transport.team.places[1]] = speed * np.linspace(0.5, 1.0, n)
         memory.governors[:] = transition.target - [0.8 * away, 0.3 * away]
         parts = transport.cells, transport.team, transport.plant, transport.nominal, departures, memory
-        update(*parts[:2], *parts[3:-1], robot_room(memory), memory, 40)
+        update(*parts[:2], *parts[3:-1], robot_room(transport.team, memory), memory, 40)
         watch(40, *parts, watch_room(transport.plant), figures)
         numbers = memory.efforts[0], memory.governors.ravel(), memory.reports[0].ravel(), figures
         found.append([repr(number) for row in numbers for number in row.tolist()])

@@ -15,11 +15,20 @@ from pydrake.systems.primitives import Demultiplexer
 
 from coop_drake.answers.log import SimulationLog
 from coop_drake.compiled_loop import CompiledTransport
-from coop_drake.compiled_loop.arrays import LoopCells, LoopDepartures, LoopMemory, LoopNominal
-from coop_drake.compiled_loop.looping import compute, update
-from coop_drake.compiled_loop.robots import ACCELERATION, COMMAND, ENERGY, heard_cell, robot_room
+from coop_drake.compiled_loop.arrays import (
+    ACCELERATION,
+    COMMAND,
+    ENERGY,
+    LoopCells,
+    LoopDepartures,
+    LoopMemory,
+    LoopNominal,
+    RobotRoom,
+    robot_room,
+)
+from coop_drake.compiled_loop.loop import update
+from coop_drake.compiled_loop.robots import compute, heard_cell, measure
 from coop_drake.compiled_loop.running import believed, departures_of, memory_of, nominal_of
-from coop_drake.compiled_loop.sensing import measure
 from coop_drake.compiled_loop.watching import left_by_all
 from coop_drake.diagram.station import (
     Loop,
@@ -56,8 +65,9 @@ POSE, GOVERNOR, MARGIN, READY, ALARM, WANTED = 0, 3, 5, 6, 8, 11
 
 @compiled
 def tell(
-    cells: LoopCells, team: FusedTeam, nominal: LoopNominal, departures: LoopDepartures, memory: LoopMemory,
-    sample: int, number: int, now: float, instant: FloatArray, shown: FloatArray, bounds: FloatArray,
+    cells: LoopCells, team: FusedTeam, nominal: LoopNominal, departures: LoopDepartures, room: RobotRoom,
+    memory: LoopMemory, sample: int, number: int, now: float, instant: FloatArray, shown: FloatArray,
+    bounds: FloatArray,
 ) -> None:  # fmt: skip
     """Write what the blocks of all robots and the cell planner would show now, before a sample's updates.
 
@@ -66,6 +76,7 @@ def tell(
         team: The robots' models.
         nominal: The nominal motions.
         departures: What departs.
+        room: Room for what robots compute.
         memory: What changes; it is changed as by a sample, so that it must be a copy.
         sample: Number of the sample, or of the next one between two samples.
         number: Number of the control period that ``now`` is in.
@@ -76,17 +87,16 @@ def tell(
     """
     current, robots = memory.current[sample % memory.current.shape[0]], team.yaws.size
     cell = int(current[0])
-    arrived = cell + 1 == cells.rows.shape[0] and left_by_all(cell, memory)
+    arrived = cell + 1 == cells.rows.shape[0] and left_by_all(cell, memory.channels)
     instant[0], instant[1], instant[2] = current[0], current[1], 1.0 if arrived else 0.0
-    room, robot = robot_room(memory), np.empty(memory.state.size)
-    told = room.told
-    measure(sample, number, team, departures, memory, room.errors)
+    robot, told = np.empty(memory.state.size), room.told
+    measure(sample, number, team, departures, memory, room)
     led = memory.nominal[sample % memory.nominal.shape[0]]
     for k in range(robots):
         row, begin = shown[k], k + team.first[2, k]
         end = begin + 1 + team.first[2, k + 1] - team.first[2, k]
-        heard, time = heard_cell(k, sample, now, departures, memory)
-        read_own(k, team.places, team.first, team.base_chains, team.yaws, memory.state, robot)
+        heard, time = heard_cell(k, sample, now, departures.hearing, memory.current)
+        read_own(k, team.places, team.first, team.base_chains, team.yaws, room.motion, memory.state, robot)
         row[POSE : POSE + 3] = robot[:3]
         row[GOVERNOR : GOVERNOR + 2] = led[4:6] if nominal.flow.size else memory.governors[k]
         compute(k, sample, number, now, True, cells, team, nominal, departures, room, memory)
@@ -148,8 +158,8 @@ class SampledTeam(Block):
         }
         self._efforts = self._parts["efforts"][0]
         shown, bounds = np.empty((self._robots, SHOWN)), np.empty((2, self._axes))
-        self._tell = partial(tell, *known)
-        self._update = partial(update, *known, robot_room(memory))
+        self._tell = partial(tell, *known, robot_room(team, memory))
+        self._update = partial(update, *known, robot_room(team, memory))
         self._follow = partial(lag_behind, lag)
         self._state = self.DeclareVectorInputPort("team_state", memory.state.size)
         start = np.concatenate([[0.0, 0.0], *(part.ravel() for part in kept.values())])

@@ -6,10 +6,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from coop_drake.compiled_loop.looping import update
-from coop_drake.compiled_loop.motion import advance, motion_room
+from coop_drake.compiled_loop.arrays import plant_room, robot_room
+from coop_drake.compiled_loop.loop import advance, update
 from coop_drake.compiled_loop.preparing import CompiledTransport
-from coop_drake.compiled_loop.robots import robot_room
 from coop_drake.compiled_loop.running import believed, departures_of, memory_of, nominal_of
 from coop_drake.compiled_loop.watching import left_by_all
 from coop_drake.plant.configuration import displacement
@@ -39,11 +38,11 @@ def run_unwatched(transport: CompiledTransport, deployment: Deployment, seconds:
     period, memory = float(departures.times[0]), memory_of(transport, departures)
     memory.state[transport.order] += displacement(deployment, len(transport.order))
     team, nominal = believed(transport.team, deployment.mass_error), nominal_of(transport, period)
-    room, motion = robot_room(memory), motion_room(len(transport.robot_names), transport.plant)
+    room, motion = robot_room(team, memory), plant_room(team, transport.plant)
     for sample in range(round(seconds / period) + 1):
         cell = int(memory.current[sample % len(memory.current), 0])
         z = memory.state[transport.order]
-        if cell + 1 == len(transport.plan.cells) and left_by_all(cell, memory):
+        if cell + 1 == len(transport.plan.cells) and left_by_all(cell, memory.channels):
             return Unwatched(True, sample * period, z, cell)
         if not np.isfinite(memory.state).all():
             break
