@@ -39,8 +39,7 @@ from shapely.geometry.base import BaseGeometry
 from benchmarks.questions.peers import run_trees
 from coop_drake.answers import PlanningProblem
 from coop_drake.tree import PlanarPose
-from coop_drake.tree.component_tree import ConvexShape, TreeJoint
-from coop_drake.tree.levers import configuration_scale
+from coop_drake.tree.component_tree import ConvexShape, TreeJoint, configuration_scale
 from coop_drake.tree.pose import FloatArray
 
 __all__ = ["GcsRun", "run_gcs"]

@@ -22,8 +22,7 @@ from coop_drake.planning.sampling.collision import bodies_apart, grid_for_team, 
 from coop_drake.plant import planning_problem
 from coop_drake.scenario import Goal, ObjectPose, Scenario, Start, Workspace, dump_scenario, load_scenario
 from coop_drake.scenario.model import DirectiveEntry, RobotLimits
-from coop_drake.tree.component_tree import ComponentTree
-from coop_drake.tree.levers import axis_levers
+from coop_drake.tree.component_tree import ComponentTree, axis_levers
 from coop_drake.tree.pose import FloatArray
 from coop_drake.tree.team_arrays import TeamArrays, place
 

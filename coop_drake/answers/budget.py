@@ -8,7 +8,7 @@ from typing import Annotated
 
 import numpy as np
 
-from coop_drake.tree.bodies import BODY, Bodies
+from coop_drake.tree.component_tree import BODY, Bodies
 from coop_drake.typed_data import (
     EXACT,
     Bound,

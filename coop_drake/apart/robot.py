@@ -67,7 +67,7 @@ from coop_drake.plant import robot_chain
 from coop_drake.plant.chain import is_circle
 from coop_drake.scenario import Deployment
 from coop_drake.systems import axis_laws, robot_record
-from coop_drake.tree.circles import whole_turns
+from coop_drake.tree.component_tree import whole_turns
 from coop_drake.tree.pose import FloatArray
 
 Said = list[Ready | HoldRequest | AtRest]

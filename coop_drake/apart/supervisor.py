@@ -26,7 +26,7 @@ from coop_drake.diagram.hold import add_supervisor
 from coop_drake.laws.sampling import period_of, whole_periods
 from coop_drake.scenario import Hold as HoldSettings
 from coop_drake.systems import CellPlanner
-from coop_drake.tree.circles import whole_turns
+from coop_drake.tree.component_tree import whole_turns
 from coop_drake.tree.pose import FloatArray
 
 _NOTHING = np.array([-1.0, -1.0])

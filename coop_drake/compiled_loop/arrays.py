@@ -15,7 +15,6 @@ from coop_drake.laws.chain_motion import MOTION_COLUMNS
 from coop_drake.laws.sticking import StickingRoom, sticking_room
 from coop_drake.laws.team_dynamics import TeamWork, team_work
 from coop_drake.systems.nominal_kernels import NOMINAL_SIZE
-from coop_drake.systems.team_kernels import FusedTeam
 from coop_drake.tree.pose import FloatArray, IntArray
 from coop_drake.tree.team_arrays import TeamArrays
 
@@ -53,6 +52,28 @@ class LoopCells(NamedTuple):
     tolerance: float
     places: FloatArray
     rooms: FloatArray
+
+
+class LoopTeam(NamedTuple):
+    """The robots, their tables stacked; row ``first[i, k]`` of a stack is the first one of robot k.
+
+    Attributes:
+        places: Where z, then its rates stand in the plant's state, shape (2, 3 + n).
+        first: First rows in ``chains`` and in ``base_chains``, first joint, shape (3, N + 1).
+        chains: From every robot's base to its end effector.
+        base_chains: From the object to every robot's base.
+        yaws: Angle of every base in the object where all joints are at zero, shape (N,) [rad].
+        loads: What ``end_effector_command`` takes of every robot, shape (N, 7).
+        tracking: K, zeta, K_t and zeta_t where the position tracks a nominal motion, else of shape (0,).
+    """
+
+    places: IntArray
+    first: IntArray
+    chains: FloatArray
+    base_chains: FloatArray
+    yaws: FloatArray
+    loads: FloatArray
+    tracking: FloatArray
 
 
 class LoopPlant(NamedTuple):
@@ -209,7 +230,7 @@ class RobotRoom(NamedTuple):
         robots: The robot's own state in the same three ways, shape (3, 2 (3 + n)).
         governed: p_G' as the robot moves its own p_G, zero where a nominal motion leads, then the desired
             acceleration of the object's origin, shape (4,) [m/s, m/s^2].
-        told: What the robot tells the log, see ``TOLD``.
+        told: What every robot tells the log, see ``TOLD``, shape (N, ``TOLD``).
         law: What the law of all axes asks for, shape (M,).
         pulled: That of the robot's with the pull to the nominal motion, shape (M,).
         later: Nominal axes when efforts act, shape (3, M).
@@ -241,18 +262,18 @@ class RobotRoom(NamedTuple):
     shown: FloatArray
 
 
-def robot_room(team: FusedTeam, memory: LoopMemory) -> RobotRoom:
+def robot_room(team: LoopTeam, memory: LoopMemory) -> RobotRoom:
     """Return room for the robots of a team."""
     M, state, line = memory.jumps.size, memory.state.size, memory.lines.shape[2:]
     return RobotRoom(
-        np.empty(3), np.empty((3, 6)), np.empty((3, state)), np.empty(4), np.empty(TOLD), np.empty(M),
-        np.empty(M), np.empty((3, M)), np.empty(M), np.empty((2, M)), np.empty(memory.efforts.shape[1]),
-        np.empty(state), np.empty((line[0] + 1, line[1])), np.empty(memory.channels.shape[1:]),
-        _longest_motion(team), np.empty(NOMINAL_SIZE),
+        np.empty(3), np.empty((3, 6)), np.empty((3, state)), np.empty(4), np.empty((team.yaws.size, TOLD)),
+        np.empty(M), np.empty(M), np.empty((3, M)), np.empty(M), np.empty((2, M)),
+        np.empty(memory.efforts.shape[1]), np.empty(state), np.empty((line[0] + 1, line[1])),
+        np.empty(memory.channels.shape[1:]), _longest_motion(team), np.empty(NOMINAL_SIZE),
     )  # fmt: skip
 
 
-def _longest_motion(team: FusedTeam) -> FloatArray:
+def _longest_motion(team: LoopTeam) -> FloatArray:
     """Return room for the motion of the longest chain of a team."""
     return np.empty((int(np.diff(team.first[:2]).max()), MOTION_COLUMNS))
 
@@ -285,7 +306,7 @@ class MotionRoom(NamedTuple):
     blocked: FloatArray
 
 
-def plant_room(team: FusedTeam, plant: LoopPlant) -> MotionRoom:
+def plant_room(team: LoopTeam, plant: LoopPlant) -> MotionRoom:
     """Return room for a team's motion."""
     links, robots = plant.tree.shape[0], team.yaws.size
     n = links + 2

@@ -8,11 +8,12 @@ from coop_drake.compiled_loop.arrays import (
     LoopMemory,
     LoopNominal,
     LoopPlant,
+    LoopTeam,
     MotionRoom,
     RobotRoom,
     WatchRoom,
 )
-from coop_drake.compiled_loop.robots import compute, measure
+from coop_drake.compiled_loop.robots import compute, read_own
 from coop_drake.compiled_loop.watching import ENDED, RUNS, left_by_all, watch
 from coop_drake.jit import compiled
 from coop_drake.laws.actuators import lag_behind, limit_efforts
@@ -23,7 +24,6 @@ from coop_drake.laws.random_draws import uniform_pair
 from coop_drake.laws.sticking import stick
 from coop_drake.laws.team_dynamics import team_accelerations
 from coop_drake.systems.nominal_kernels import step_nominal
-from coop_drake.systems.team_kernels import FusedTeam, read_own
 from coop_drake.tree.pose import FloatArray
 
 BEGIN, END = 4, 5
@@ -35,7 +35,7 @@ EARLY = 1e-6
 
 @compiled(borrows=True)
 def run_loop(
-    cells: LoopCells, team: FusedTeam, plant: LoopPlant, nominal: LoopNominal, departures: LoopDepartures,
+    cells: LoopCells, team: LoopTeam, plant: LoopPlant, nominal: LoopNominal, departures: LoopDepartures,
     memory: LoopMemory, room: RobotRoom, motion: MotionRoom, seen: WatchRoom, figures: FloatArray,
 ) -> None:  # fmt: skip
     """Run a transport.
@@ -63,19 +63,20 @@ def run_loop(
 
 @compiled(borrows=True)
 def update(
-    cells: LoopCells, team: FusedTeam, nominal: LoopNominal, departures: LoopDepartures, room: RobotRoom,
+    cells: LoopCells, team: LoopTeam, nominal: LoopNominal, departures: LoopDepartures, room: RobotRoom,
     memory: LoopMemory, sample: int,
 ) -> None:  # fmt: skip
-    """Do what all robots do at a sample: all read what was before, as in Drake."""
-    time = sample * departures.times[0]
-    measure(sample, sample, team, departures, memory, room)
+    """Do all that is done at a sample, and carry what is between the robots over a period."""
+    period, channels = departures.times[0], memory.channels
     for i in range(room.held.size):
         room.held[i] = memory.efforts[0, i]
+    compute(sample, sample, sample * period, False, cells, team, nominal, departures, room, memory)
+
+    # Robots that fall silent, with motors that fail; limits of actuators.
     for k in range(team.yaws.size):
-        compute(k, sample, sample, time, False, cells, team, nominal, departures, room, memory)
         first, last = team.first[2, k], team.first[2, k + 1]
         begin, end, motors = departures.silences[0, k], departures.silences[1, k], departures.silences[2, k]
-        silent = _within(begin, end, sample, departures.times[0])
+        silent = _within(begin, end, sample, period)
         stands, other = (1, 0) if silent else (0, 1)  # While a robot is silent, its last report stands.
         for i in range(memory.reports.shape[2]):
             memory.reports[other, k, i] = memory.reports[stands, k, i]
@@ -84,50 +85,44 @@ def update(
             for i in range(own.size):
                 own[i] = room.held[3 * k + first + i] if motors == 1.0 else 0.0
         limit_efforts(departures.limits[2 * k + first : 2 * k + 2 + last], own)
-    _carry(sample, cells, nominal, departures, memory, room)
 
-
-@compiled(inlined=True, borrows=True)
-def _carry(
-    sample: int, cells: LoopCells, nominal: LoopNominal, departures: LoopDepartures, memory: LoopMemory,
-    room: RobotRoom,
-) -> None:  # fmt: skip
-    """Carry the nominal motions, the cell planner and the channels of reports over a period."""
-    period, now = departures.times[0], sample % memory.current.shape[0]
-    cell = int(memory.current[now, 0])
+    # The nominal motions and the cell planner, which all read what was before, as in Drake.
+    entered = memory.current[sample % memory.current.shape[0]]
+    following = memory.current[(sample + 1) % memory.current.shape[0]]
+    cell = int(entered[0])
     if nominal.flow.size:
-        ring, first = memory.nominal.shape[0], cells.first
-        edges = cells.governed[first[0, cell] : first[0, cell + 1]]
-        flat = cells.flats[first[2, cell] : first[2, cell + 1]]
-        field = cells.fields[first[3, cell] : first[3, cell + 1]]
-        led, later = memory.nominal[sample % ring], memory.nominal[(sample + 1) % ring]
-        step_nominal(
-            cells.rows[cell], edges, flat, field, nominal.flow, period, nominal.position[0], 1.0, led, later
-        )
+        ring, rows = memory.nominal.shape[0], cells.first
+        edges = cells.governed[rows[0, cell] : rows[0, cell + 1]]
+        flat = cells.flats[rows[2, cell] : rows[2, cell + 1]]
+        field = cells.fields[rows[3, cell] : rows[3, cell + 1]]
+        now, later = memory.nominal[sample % ring], memory.nominal[(sample + 1) % ring]
+        speed = nominal.position[0]
+        step_nominal(cells.rows[cell], edges, flat, field, nominal.flow, period, speed, 1.0, now, later)
     if nominal.axis_gains.size:
         ring = memory.axes.shape[0]
-        axes, later_axes = memory.axes[sample % ring], memory.axes[(sample + 1) % ring]
-        carry_axes(axes, room.law, period, nominal.axis_gains[2], later_axes)
-    following = memory.current[(sample + 1) % memory.current.shape[0]]
-    following[0], following[1] = memory.current[now, 0], memory.current[now, 1]
-    if cell + 1 < cells.rows.shape[0] and left_by_all(cell, memory.channels):
+        now_axes, later_axes = memory.axes[sample % ring], memory.axes[(sample + 1) % ring]
+        carry_axes(now_axes, room.law, period, nominal.axis_gains[2], later_axes)
+    following[0], following[1] = entered[0], entered[1]
+    if cell + 1 < cells.rows.shape[0] and left_by_all(cell, channels):
         following[0], following[1] = cell + 1, sample * period
+
+    # The channels of reports.
     loss, repeat = departures.probabilities[2], departures.probabilities[3]
-    for k in range(memory.channels.shape[0]):
+    for k in range(channels.shape[0]):
         arrives, repeated = True, False
         if loss > 0.0 or repeat > 0.0:
             chances = uniform_pair(departures.seeds[k, 0], sample)
             arrives, repeated = chances[0] >= loss, chances[1] < repeat
-        kept = memory.channels[k]
-        carry_reports(kept, memory.reports[0, k], arrives, repeated, departures.periods[2], room.arrivals)
-        for i in range(kept.shape[0]):
-            for j in range(kept.shape[1]):
-                kept[i, j] = room.arrivals[i, j]
+        delay, arrivals = departures.periods[2], room.arrivals
+        carry_reports(channels[k], memory.reports[0, k], arrives, repeated, delay, arrivals)
+        for i in range(arrivals.shape[0]):
+            for j in range(arrivals.shape[1]):
+                channels[k, i, j] = arrivals[i, j]
 
 
 @compiled(borrows=True)
 def advance(
-    sample: int, team: FusedTeam, plant: LoopPlant, departures: LoopDepartures, memory: LoopMemory,
+    sample: int, team: LoopTeam, plant: LoopPlant, departures: LoopDepartures, memory: LoopMemory,
     room: MotionRoom,
 ) -> None:  # fmt: skip
     """Carry the team's state and its actuators' efforts over a period, by the classical Runge-Kutta method.
@@ -137,6 +132,7 @@ def advance(
     period, n = departures.times[0], memory.state.size // 2
     sticks = departures.friction[0] > 0.0 or departures.friction[1] > 0.0
     state, start, change, slopes = room.states[0], room.states[1], room.states[2], room.slopes
+    robots, wrenches, efforts, floor = team.yaws.size, room.wrenches, room.efforts, departures.floor
     for i in range(room.acting.size):
         room.acting[i] = memory.efforts[1, i]
     for i in range(2 * n):
@@ -149,16 +145,37 @@ def advance(
         ahead = 0.0 if stage == 0 else period if stage == 3 else 0.5 * period
         if stage != 2:  # Efforts are those of stage 1.
             lag_behind(departures.times[2], ahead, memory.efforts[0], room.acting, memory.efforts[1])
-        _drive(sample, sample * period + ahead, state, team, plant, departures, memory, room)
+        for i in range(3):
+            wrenches[robots, i] = 0.0
+        for k in range(robots):
+            first, own, left = team.first[2, k], 3 * k + team.first[2, k], 1.0
+            if _within(departures.slips[0, k], departures.slips[1, k], sample, period):
+                left -= departures.slips[2, k]
+            for i in range(3):
+                wrenches[k, i] = left * memory.efforts[1, own + i]
+            for i in range(team.first[2, k + 1] - first):
+                limit, effort = plant.strongest[first + i], memory.efforts[1, own + 3 + i]
+                efforts[team.places[1, 3 + first + i] - n] = min(max(effort, -limit), limit)
+            if floor[0] > 0.0 or floor[1] > 0.0:
+                yaw = team.yaws[k]
+                read_own(k, team.places, team.first, team.base_chains, yaw, room.motion, state, room.robot)
+                rates = 3 + team.first[2, k + 1] - first
+                fx, fy = base_friction(room.robot[rates], room.robot[rates + 1], floor[0], floor[1])
+                wrenches[k, 0] += fx
+                wrenches[k, 1] += fy
+        for push in range(departures.pushes.shape[0]):
+            row = departures.pushes[push]
+            if row[BEGIN] <= sample * period + ahead < row[END]:
+                for i in range(3):
+                    wrenches[int(row[0]), i] += row[1 + i]
         if sticks:
             stick(
-                plant.tree, plant.bases, plant.places, room.blocked, departures.friction, room.efforts,
-                departures.floor[2], state, room.work, room.sticking, slopes, room.wrenches,
+                plant.tree, plant.bases, plant.places, room.blocked, departures.friction, efforts, floor[2],
+                state, room.work, room.sticking, slopes, wrenches,
             )  # fmt: skip
         else:
             team_accelerations(
-                plant.tree, plant.bases, plant.places, room.wrenches, room.efforts, departures.floor[2],
-                state, room.work, slopes,
+                plant.tree, plant.bases, plant.places, wrenches, efforts, floor[2], state, room.work, slopes,
             )  # fmt: skip
         weight = period / 6.0 if stage in (0, 3) else period / 3.0
         further = 0.0 if stage == 3 else period if stage == 2 else 0.5 * period
@@ -176,47 +193,3 @@ def _within(begin: float, end: float, sample: int, period: float) -> bool:
     """Whether a period begins in an interval of time [s]."""
     early = EARLY * period
     return bool(begin - early <= sample * period < end - early)
-
-
-@compiled(inlined=True, borrows=True)
-def _drive(
-    sample: int, time: float, state: FloatArray, team: FusedTeam, plant: LoopPlant,
-    departures: LoopDepartures, memory: LoopMemory, room: MotionRoom,
-) -> None:  # fmt: skip
-    """Write the wrenches on bases and object, and the efforts of all joints.
-
-    Args:
-        sample: Number of the sample that began the period.
-        time: Now [s].
-        state: The team's, in the order of the plant, shape (2 (3 + n),).
-        team: Where joints stand in it.
-        plant: The simulated team.
-        departures: What departs.
-        memory: Holds the efforts.
-        room: Receives wrenches and efforts.
-    """
-    robots, size, wrenches, efforts = team.yaws.size, state.size // 2, room.wrenches, room.efforts
-    for i in range(3):
-        wrenches[robots, i] = 0.0
-    for k in range(robots):
-        first, own = team.first[2, k], 3 * k + team.first[2, k]
-        left = 1.0
-        if _within(departures.slips[0, k], departures.slips[1, k], sample, departures.times[0]):
-            left -= departures.slips[2, k]
-        for i in range(3):
-            wrenches[k, i] = left * memory.efforts[1, own + i]
-        for i in range(team.first[2, k + 1] - first):
-            limit, effort = plant.strongest[first + i], memory.efforts[1, own + 3 + i]
-            efforts[team.places[1, 3 + first + i] - size] = min(max(effort, -limit), limit)
-        if departures.floor[0] > 0.0 or departures.floor[1] > 0.0:
-            read_own(k, team.places, team.first, team.base_chains, team.yaws, room.motion, state, room.robot)
-            n = 3 + team.first[2, k + 1] - first
-            vx, vy = room.robot[n], room.robot[n + 1]
-            fx, fy = base_friction(vx, vy, departures.floor[0], departures.floor[1])
-            wrenches[k, 0] += fx
-            wrenches[k, 1] += fy
-    for push in range(departures.pushes.shape[0]):
-        row = departures.pushes[push]
-        if row[BEGIN] <= time < row[END]:
-            for i in range(3):
-                wrenches[int(row[0]), i] += row[1 + i]

@@ -9,7 +9,7 @@ import numpy as np
 from pydrake.systems.framework import DiagramBuilder
 
 from coop_drake.answers.plan import Plan
-from coop_drake.compiled_loop.arrays import LoopCells, LoopNominal, LoopPlant
+from coop_drake.compiled_loop.arrays import LoopCells, LoopNominal, LoopPlant, LoopTeam
 from coop_drake.diagram.knowledge import arrival_goal, governed_cells, rest_tolerance, robot_knowledge
 from coop_drake.diagram.robot_controller import RobotKnowledge
 from coop_drake.errors import ScenarioError
@@ -26,11 +26,10 @@ from coop_drake.plant import (
 )
 from coop_drake.scenario import Scenario
 from coop_drake.simulation.clearance import TeamClearance
-from coop_drake.simulation.watch import patience
+from coop_drake.simulation.run import patience
 from coop_drake.systems import axis_laws
 from coop_drake.systems.nominal_kernels import NOTHING
-from coop_drake.systems.team_kernels import FusedTeam
-from coop_drake.tree.component_tree import ComponentTree
+from coop_drake.tree.component_tree import ComponentTree, axis_levers
 from coop_drake.tree.pose import FloatArray, IntArray
 
 
@@ -55,7 +54,7 @@ class CompiledTransport:
     plan: Plan
     robot_names: tuple[str, ...]
     cells: LoopCells
-    team: FusedTeam
+    team: LoopTeam
     plant: LoopPlant
     nominal: LoopNominal
     start: FloatArray
@@ -165,7 +164,7 @@ def _cells(scenario: Scenario, plan: Plan, maps: Sequence[HarmonicMap], joints: 
     )
 
 
-def _robots(team: TeamPlant, knowledge: Sequence[RobotKnowledge]) -> FusedTeam:
+def _robots(team: TeamPlant, knowledge: Sequence[RobotKnowledge]) -> LoopTeam:
     """Return the models of all robots as arrays.
 
     Args:
@@ -179,7 +178,7 @@ def _robots(team: TeamPlant, knowledge: Sequence[RobotKnowledge]) -> FusedTeam:
         [len(base.chain) for base in bases],
         [robot.q_slice.stop - robot.q_slice.start for robot in team.robots],
     ]
-    return FusedTeam(
+    return LoopTeam(
         places=np.array([team.position_index, team.plant.num_positions() + team.velocity_index]),
         first=np.array([[0, *np.cumsum(row)] for row in counts]),
         chains=np.vstack(chains),
@@ -190,7 +189,7 @@ def _robots(team: TeamPlant, knowledge: Sequence[RobotKnowledge]) -> FusedTeam:
     )
 
 
-def _plant(scenario: Scenario, team: TeamPlant, tree: ComponentTree, models: FusedTeam) -> LoopPlant:
+def _plant(scenario: Scenario, team: TeamPlant, tree: ComponentTree, models: LoopTeam) -> LoopPlant:
     whole = read_team_tree(team, tree)
     clearance = TeamClearance(scenario.workspace.polygon, tree)
     rows = [(0, 0)]
@@ -203,31 +202,10 @@ def _plant(scenario: Scenario, team: TeamPlant, tree: ComponentTree, models: Fus
         whole.places,
         clearance.team,
         clearance.walls,
-        _reach(tree),
+        np.array(axis_levers(tree)),
         np.array(rows, dtype=np.int64).T.copy(),
         whole.strongest,
     )
-
-
-def _reach(tree: ComponentTree) -> FloatArray:
-    """Return how far any point of a body moves at most for a unit of theta, then of every joint [m or -]."""
-    outside = [
-        max((float(np.hypot(*shape.vertices.T).max()) + shape.radius for body in component.bodies
-             for shape in body.shapes), default=0.0)
-        for component in tree.components
-    ]  # fmt: skip
-    reach = np.zeros(1 + len(tree.joints))
-    for i in range(len(tree.components) - 1, -1, -1):
-        component, joint = tree.components[i], tree.components[i].joint
-        if joint is None or component.parent is None:
-            reach[0] = max(reach[0], outside[i])
-            continue
-        slides = joint.kind == "prismatic"
-        reach[1 + joint.index] = 1.0 if slides else outside[i]
-        way = float(np.hypot(joint.X_PJ.x, joint.X_PJ.y))
-        way += max(abs(joint.lower), abs(joint.upper)) if slides else 0.0
-        outside[component.parent] = max(outside[component.parent], way + outside[i])
-    return reach
 
 
 def _nominal(plan: Plan, team: TeamPlant, knowledge: Sequence[RobotKnowledge]) -> LoopNominal:

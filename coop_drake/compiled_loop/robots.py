@@ -1,8 +1,4 @@
-"""What one robot of the compiled loop measures and computes, by the laws that Drake's blocks call.
-
-Functions of large named tuples that are called in one place are ``inlined``: each array in them is seven
-numbers to hand over.
-"""
+"""What the robots of the compiled loop measure and compute, by the laws that Drake's blocks call."""
 
 from __future__ import annotations
 
@@ -16,6 +12,7 @@ from coop_drake.compiled_loop.arrays import (
     LoopDepartures,
     LoopMemory,
     LoopNominal,
+    LoopTeam,
     RobotRoom,
 )
 from coop_drake.jit import compiled
@@ -27,12 +24,12 @@ from coop_drake.laws.load_sharing import end_effector_command
 from coop_drake.laws.measurement_errors import shift_back, write_errors
 from coop_drake.laws.nominal_axes import carry_axes, place_on_axes, pull_axes
 from coop_drake.laws.random_draws import uniform_pair
-from coop_drake.laws.robot_dynamics import estimate_object, robot_effort
-from coop_drake.systems.governor_kernels import govern
-from coop_drake.systems.nominal_kernels import accelerate_along, show_nominal
-from coop_drake.systems.ready_kernels import axes_ready, robot_arrived, robot_ready, robot_ready_along
-from coop_drake.systems.team_kernels import FusedTeam, read_own
-from coop_drake.tree.pose import FloatArray
+from coop_drake.laws.readiness import clearance_margin
+from coop_drake.laws.robot_dynamics import estimate_object, read_robot, robot_effort
+from coop_drake.systems.governor_kernels import cell_margin, govern
+from coop_drake.systems.nominal_kernels import accelerate_along, nominal_ready, show_nominal
+from coop_drake.systems.ready_kernels import axes_ready, robot_arrived
+from coop_drake.tree.pose import FloatArray, IntArray
 
 LOST_POSE, POSE_NOISE = 1, 5
 """Uses of seeds: losses and noise of measured poses; those of measured states are the next ones."""
@@ -41,100 +38,212 @@ ON_TIME = np.array([0.0, 1.0, 0.0])
 """A clock that never stood still: lag [s], pace [-] and the derivative of the pace [1/s]."""
 
 
-@compiled(inlined=True, borrows=True)
-def measure(
-    sample: int, number: int, team: FusedTeam, departures: LoopDepartures, memory: LoopMemory,
-    room: RobotRoom,
+@compiled(borrows=True)
+def compute(
+    sample: int, number: int, now: float, whole: bool, cells: LoopCells, team: LoopTeam,
+    nominal: LoopNominal, departures: LoopDepartures, room: RobotRoom, memory: LoopMemory,
 ) -> None:  # fmt: skip
-    """Write what every robot's sensors measure at a sample, before delay and losses.
+    """Do what all robots do at a sample: measure, compute efforts, move their own p_G, and report.
 
     Args:
         sample: Number of the sample, or of the next one between two samples.
-        number: Number of the control period whose noise there is now.
+        number: Number of the control period whose noise and losses there are now.
+        now: Time of the run [s].
+        whole: Whether the whole margin of every report is wanted, as blocks would report it; of a negative
+            one that rests on axes alone only the sign counts, and the position is not judged in vain.
+        cells: The plan's cells.
         team: The robots' models.
+        nominal: The nominal motions.
         departures: What departs.
+        room: Receives the accelerations of the law of all axes, and what robots tell the log.
         memory: What changes.
-        room: Room for the motion of a robot and for the errors of its state.
     """
-    now, robots = sample % memory.poses.shape[0], team.yaws.size
-    for k in range(robots):
-        own = 3 * k + team.first[2, k]
-        size = 3 + team.first[2, k + 1] - team.first[2, k]
-        pose, robot = memory.poses[now, k], memory.states[now, 2 * own : 2 * (own + size)]
+    first, period, lossy = team.first, departures.times[0], departures.probabilities
+    taken, seen_at = sample % memory.poses.shape[0], max(sample - departures.periods[0], 0)
+    led, led_then = memory.nominal[sample % memory.nominal.shape[0]], memory.nominal[0]
+    if nominal.flow.size:
+        led_then = memory.nominal[seen_at % memory.nominal.shape[0]]
+    axes_led, last_cell = nominal.axis_gains.size > 0, cells.rows.shape[0] - 1
+    for k in range(team.yaws.size):
+        # Its axes are the rows from ``begin`` to ``end``, its z_k stands at ``own``.
+        begin, end, own = k + first[2, k], k + 1 + first[2, k + 1], 3 * k + first[2, k]
+        size, chain = 2 * (2 + end - begin), team.chains[first[0, k] : first[0, k + 1]]
+        told, load = room.told[k], team.loads[k]
+
+        # Measurements, with constant errors and noise; then what of them arrives.
+        pose, robot = memory.poses[taken, k], memory.states[taken, 2 * own : 2 * own + size]
         for i in range(3):
             pose[i] = memory.state[team.places[0, i]] + departures.biases[k, i]
-        read_own(k, team.places, team.first, team.base_chains, team.yaws, room.motion, memory.state, robot)
-        for i in range(size, size + 3):
+        read_own(k, team.places, first, team.base_chains, team.yaws[k], room.motion, memory.state, robot)
+        for i in range(size // 2, size // 2 + 3):
             robot[i] *= departures.odometry[k]
-        for kind in range(2):
-            values, first, first_size = pose, 3 * k, 0
-            if kind == 1:
-                values, first, first_size = robot, 3 * robots + 2 * own, 3 + 2 * own
-            if departures.shifts[k] != 0.0:
-                there = memory.exact[sample % 2, first : first + values.size]
-                before = memory.exact[(sample + 1) % 2, first : first + values.size]
-                for i in range(values.size):
-                    there[i] = values[i]
-                    if sample == 0:
-                        before[i] = values[i]
-                shift_back(values, before, departures.shifts[k])
-            sizes, errs = departures.errors[first_size : first_size + values.size], False
-            for i in range(values.size):
-                errs = errs or sizes[i, 0] > 0.0 or sizes[i, 1] > 0.0
-            if errs:
-                errors = room.errors[: values.size]
-                write_errors(
-                    departures.seeds[k, POSE_NOISE + kind], sizes[:, 0], sizes[:, 1:], number, errors
-                )
-                for i in range(values.size):
-                    values[i] += errors[i]
+        seed, shift, sizes = departures.seeds[k, POSE_NOISE], departures.shifts[k], departures.errors
+        _err(sample, 3 * k, shift, memory.exact, seed, number, sizes[:3], room.errors, pose)
+        seed, sizes = departures.seeds[k, POSE_NOISE + 1], sizes[3 + 2 * own : 3 + 2 * own + size]
+        of_states = 3 * team.yaws.size + 2 * own
+        _err(sample, of_states, shift, memory.exact, seed, number, sizes, room.errors, robot)
+        pose, robot, seen = room.pose, room.robots[0, :size], room.seen[0]
+        for i in range(3):
+            pose[i] = memory.poses[seen_at % memory.poses.shape[0], k, i]
+        for i in range(size):
+            robot[i] = memory.states[seen_at % memory.poses.shape[0], 2 * own + i]
+        if lossy[0] > 0.0 or lossy[1] > 0.0:
+            seed = departures.seeds[k, LOST_POSE]
+            _pass(sample, number, seed, lossy, room.line, memory.lines[k, 0], pose)
+            seed = departures.seeds[k, LOST_POSE + 1]
+            _pass(sample, number, seed, lossy, room.line, memory.lines[k, 1], robot)
+        estimate_object(chain, load[:2], room.motion, robot, pose, seen)
+
+        # The desired acceleration of the object's origin, and p_G'.
+        cell, time = heard_cell(k, sample, now, departures.hearing, memory.current)
+        edges = cells.governed[cells.first[0, cell] : cells.first[0, cell + 1]]
+        governed, linear, governor = room.governed, room.governed[2:], memory.governors[k]
+        if nominal.flow.size:
+            governed[0], governed[1], governor = 0.0, 0.0, led[4:6]
+            accelerate_along(team.tracking, seen, governor, led, led_then, linear)
+        else:
+            flat = cells.flats[cells.first[2, cell] : cells.first[2, cell + 1]]
+            field = cells.fields[cells.first[3, cell] : cells.first[3, cell + 1]]
+            told[ENERGY] = govern(cells.rows[cell], edges, flat, field, time, seen, governor, governed)
+
+        # Desired accelerations of the axes, and the effort for all of them.
+        table, law, jumps = cells.tables[cell, begin:end], room.law[begin:end], room.fading[begin:end]
+        for i in range(begin, end):
+            room.fading[i] = memory.jumps[i] if memory.jumped[k] == cell else 0.0
+        acts = 0
+        if axes_led:
+            acts = 2
+            axes = memory.axes[sample % memory.axes.shape[0], :, begin:end]
+            then = memory.axes[seen_at % memory.axes.shape[0], :2, begin:end]
+            _follow_led_axes(
+                table, time, period, jumps, nominal.axis_gains, nominal.mountings[begin:end], axes, then,
+                room.seen, room.robots, size, law, room.pulled[begin:end], room.later[:, begin:end],
+            )  # fmt: skip
+        else:
+            track_axes(table, time, ON_TIME, jumps, seen, robot, law)
+        asked = room.pulled[begin:end] if axes_led else law
+        told[ACCELERATION], told[ACCELERATION + 1], told[ACCELERATION + 2] = linear[0], linear[1], asked[0]
+        end_effector_command(load, room.seen[acts], linear, asked, told[COMMAND:])
+        effort = memory.efforts[0, own : own + size // 2]
+        robot_effort(chain, room.motion, room.robots[acts, :size], told[COMMAND:], asked, effort)
+
+        # The report, by the states on which the law acts.
+        judged, judged_robot = room.seen[acts // 2], room.robots[acts // 2, :size]
+        if cell == last_cell:
+            rows, places = memory.recent.shape[0], cells.places[own : own + size // 2]
+            tolerances, errors = cells.rooms[0, k + begin : k + end], cells.rooms[1, k + begin : k + end]
+            recent = memory.recent[:, own : own + size // 2]
+            margin = arrival_margin(places, tolerances, errors, recent, (sample - 1) % rows)
+            shown = led[: 4 if nominal.flow.size else 0]
+            margin = robot_arrived(
+                table, cells.goal, cells.tolerance, axes_led, judged, judged_robot, shown, margin
+            )
+            for i in range(size // 2):
+                recent[sample % rows, i] = pose[i] if i < 3 else robot[i]
+        else:
+            margin = axes_ready(table, cells.tables[cell + 1, begin:end], False, time, judged, judged_robot)
+            if whole or not margin < 0.0:
+                stiffness = cells.numbers[cell + 1, 1]
+                following = cells.governed[cells.first[0, cell + 1] : cells.first[0, cell + 2]]
+                if nominal.flow.size:
+                    speed, periods = nominal.position[0], nominal.position[1]
+                    target, own_stiffness = cells.numbers[cell, 3:], cells.numbers[cell, 1]
+                    show_nominal(edges, own_stiffness, target, period, periods, speed, led, room.shown)
+                    at_position = nominal_ready(following, stiffness, room.shown, governor)
+                else:
+                    energy = cell_margin(following, stiffness, judged, governor)
+                    at_position = clearance_margin(energy, stiffness, cells.numbers[cell, 0])
+                margin = min(at_position, margin)
+        if nominal.levels.size:
+            _monitor(k, sample, now, team, cells, nominal, departures, memory, room, robot)
+            margin = quiet_margin(margin, memory.alarms[k, 0])
+        memory.reports[0, k, 0], memory.reports[0, k, 1] = cell, margin
+        if margin >= 0.0 and cell < last_cell:  # The next cell may begin now.
+            after, own_jumps = cells.tables[cell + 1, begin:end], memory.jumps[begin:end]
+            write_jumps(table, after, time, ON_TIME, judged, judged_robot, own_jumps)
+            memory.jumped[k] = cell + 1
+        memory.governors[k, 0] += period * governed[0]
+        memory.governors[k, 1] += period * governed[1]
 
 
-@compiled(inlined=True, borrows=True)
-def receive(
-    k: int, sample: int, number: int, team: FusedTeam, departures: LoopDepartures, memory: LoopMemory,
-    pose: FloatArray, robot: FloatArray, following: FloatArray,
+@compiled(borrows=True)
+def read_own(
+    k: int, places: IntArray, first: IntArray, base_chains: FloatArray, yaw: float, motion: FloatArray,
+    state: FloatArray, robot: FloatArray,
 ) -> None:  # fmt: skip
-    """Write the pose and the state that robot k has, and carry its lines over a period.
+    """Write (z_k, z_k') of robot k, see ``read_robot``; ``motion`` is room for the longest chain's motion."""
+    joints = places[:, 3 + first[2, k] : 3 + first[2, k + 1]]
+    read_robot(base_chains[first[1, k] : first[1, k + 1]], yaw, joints, motion, state, robot)
+
+
+@compiled(borrows=True)
+def _err(
+    sample: int, first: int, shift: float, exact: FloatArray, seed: int, number: int, sizes: FloatArray,
+    errors: FloatArray, values: FloatArray,
+) -> None:  # fmt: skip
+    """Replace what there is to measure by what is measured: at another time by a wrong clock, with errors.
 
     Args:
-        k: The robot.
-        sample: This and the next four arguments are those of ``measure``.
-        number: Number of the control period.
-        team: The robots' models.
-        departures: What departs.
-        memory: What changes.
-        pose: Receives the object's pose, shape (3,) [m, m, rad].
-        robot: Receives the robot's own state (z_k, z_k'), shape (2 (3 + n_k),).
-        following: Room for a line and what is measured, shape (rows + 1, 1 + size).
+        sample: Number of the sample.
+        first: Where the values stand in a row of ``exact``.
+        shift: How much earlier they are measured, in periods.
+        exact: See ``LoopMemory``.
+        seed: That of the noise.
+        number: Number of the control period whose noise there is now.
+        sizes: Of the errors, see ``LoopDepartures``, shape (size, 4).
+        errors: Room for them.
+        values: What there is; receives what is measured, shape (size,).
     """
-    own = 2 * (3 * k + team.first[2, k])
-    seen = max(sample - departures.periods[0], 0) % memory.poses.shape[0]
-    for i in range(3):
-        pose[i] = memory.poses[seen, k, i]
-    for i in range(robot.size):
-        robot[i] = memory.states[seen, own + i]
-    if not (departures.probabilities[0] > 0.0 or departures.probabilities[1] > 0.0):
-        return
-    for kind in range(2):
-        values, line = pose if kind == 0 else robot, memory.lines[k, kind]
-        if sample == 0:  # What is measured first is there from the beginning.
-            for row in range(line.shape[0]):
-                line[row, 0] = NOTHING
-                for i in range(values.size):
-                    line[row, 1 + i] = values[i]
-        measured, carried = following[line.shape[0], 1:], following[: line.shape[0]]
-        for i in range(measured.size):
-            measured[i] = values[i] if i < values.size else 0.0
-        chances = uniform_pair(departures.seeds[k, LOST_POSE + kind], number)
-        lost, late = chances[0] < departures.probabilities[0], chances[1] < departures.probabilities[1]
-        if lost or late:
+    if shift != 0.0:
+        there, before = exact[sample % 2], exact[(sample + 1) % 2]
+        for i in range(values.size):
+            there[first + i] = values[i]
+            if sample == 0:
+                before[first + i] = values[i]
+        shift_back(values, before[first : first + values.size], shift)
+    largest = 0.0
+    for i in range(values.size):
+        largest = max(largest, sizes[i, 0], sizes[i, 1])
+    if largest > 0.0:
+        write_errors(seed, sizes[:, 0], sizes[:, 1:], number, errors[: values.size])
+        for i in range(values.size):
+            values[i] += errors[i]
+
+
+@compiled(borrows=True)
+def _pass(
+    sample: int, number: int, seed: int, probabilities: FloatArray, room: FloatArray, line: FloatArray,
+    values: FloatArray,
+) -> None:  # fmt: skip
+    """Replace what is measured by what has arrived of it, and carry the line over a period.
+
+    Args:
+        sample: Number of the sample.
+        number: Number of the control period.
+        seed: That of the losses.
+        probabilities: See ``LoopDepartures``.
+        room: Room for a line and what is measured, shape (rows + 1, 1 + size).
+        line: The line, shape (rows, 1 + size).
+        values: What is measured; receives what has arrived.
+    """
+    rows = line.shape[0]
+    if sample == 0:  # What is measured first is there from the beginning.
+        for row in range(rows):
+            line[row, 0] = NOTHING
             for i in range(values.size):
-                values[i] = line[0, 1 + i]
-        carry_measurements(line, number, measured, lost, late, carried)
-        for row in range(line.shape[0]):
-            for i in range(line.shape[1]):
-                line[row, i] = carried[row, i]
+                line[row, 1 + i] = values[i]
+    measured, following = room[rows, 1:], room[:rows]
+    for i in range(measured.size):
+        measured[i] = values[i] if i < values.size else 0.0
+    chances = uniform_pair(seed, number)
+    lost, late = chances[0] < probabilities[0], chances[1] < probabilities[1]
+    if lost or late:
+        for i in range(values.size):
+            values[i] = line[0, 1 + i]
+    carry_measurements(line, number, measured, lost, late, following)
+    for row in range(rows):
+        for i in range(line.shape[1]):
+            line[row, i] = following[row, i]
 
 
 @compiled(borrows=True)
@@ -157,120 +266,35 @@ def heard_cell(
     return int(entered[0]), now - (entered[1] - hearing[0, k])
 
 
-@compiled(inlined=True, borrows=True)
-def compute(
-    k: int, sample: int, number: int, now: float, whole: bool, cells: LoopCells, team: FusedTeam,
-    nominal: LoopNominal, departures: LoopDepartures, room: RobotRoom, memory: LoopMemory,
+@compiled(borrows=True)
+def _follow_led_axes(
+    table: FloatArray, time: float, period: float, jumps: FloatArray, gains: FloatArray,
+    mounting: FloatArray, now: FloatArray, then: FloatArray, seen: FloatArray, robots: FloatArray, size: int,
+    law: FloatArray, pulled: FloatArray, later: FloatArray,
 ) -> None:  # fmt: skip
-    """Do what robot k computes at a sample: its effort, its report, its own p_G, and the law of its axes.
+    """Write what the law asks of axes that have a nominal motion, and the pull towards this motion.
 
     Args:
-        k: The robot.
-        sample: Number of the sample, or of the next one between two samples.
-        number: Number of the control period whose noise and losses there are now.
-        now: Time of the run [s].
-        whole: As in ``report``.
-        cells: The plan's cells.
-        team: The robots' models.
-        nominal: The nominal motions.
-        departures: What departs.
-        room: Receives the accelerations of the law of its axes, and what the robot tells the log.
-        memory: What changes.
+        table: The robot's axes in its cell.
+        time: Time since the cell's entry [s].
+        period: T [s].
+        jumps: Jumps that fade.
+        gains: See ``LoopNominal.axis_gains``.
+        mounting: That of its base, see ``place_on_axes``.
+        now: x^, x^' and a^ of its axes.
+        then: x^ and x^' when its measurements were made.
+        seen: See ``RobotRoom``; row 0 holds the object's state, rows 1 and 2 are written.
+        robots: Likewise the robot's own state.
+        size: Its size.
+        law: Receives what the law asks for.
+        pulled: Receives the same with the pull.
+        later: Receives the nominal axes of when efforts act.
     """
-    begin, end = k + team.first[2, k], k + 1 + team.first[2, k + 1]
-    measured, seen, governed = room.robots[0, : 2 * (2 + end - begin)], room.seen[0], room.governed
-    receive(k, sample, number, team, departures, memory, room.pose, measured, room.line)
-    chain = team.chains[team.first[0, k] : team.first[0, k + 1]]
-    estimate_object(chain, team.loads[k, :2], room.motion, measured, room.pose, seen)
-    cell, time = heard_cell(k, sample, now, departures.hearing, memory.current)
-    if nominal.flow.size:
-        governed[0], governed[1] = 0.0, 0.0
-        ring = memory.nominal.shape[0]
-        here, then = memory.nominal[sample % ring], max(sample - departures.periods[0], 0) % ring
-        accelerate_along(team.tracking, seen, here[4:6], here, memory.nominal[then], governed[2:])
-    else:
-        first = cells.first
-        edges = cells.governed[first[0, cell] : first[0, cell + 1]]
-        flat = cells.flats[first[2, cell] : first[2, cell + 1]]
-        field = cells.fields[first[3, cell] : first[3, cell + 1]]
-        row = cells.rows[cell]
-        room.told[ENERGY] = govern(row, edges, flat, field, time, seen, memory.governors[k], governed)
-    led_row = follow_axes(k, sample, cell, time, cells, team, nominal, departures, memory, room)
-    led, led_robot = room.seen[led_row], room.robots[led_row, : measured.size]
-    margin = report(
-        k, sample, cell, time, led, led_robot, cells, nominal, departures, memory, begin, whole, room.shown
-    )
-    if cell + 1 == cells.rows.shape[0]:
-        own = 2 * k + begin
-        newest = memory.recent[sample % memory.recent.shape[0], own : own + 2 + end - begin]
-        for i in range(newest.size):
-            newest[i] = room.pose[i] if i < 3 else measured[i]
-    if nominal.levels.size:
-        judge(k, sample, now, team, cells, nominal, departures, memory, room, measured)
-        margin = quiet_margin(margin, memory.alarms[k, 0])
-    memory.reports[0, k, 0], memory.reports[0, k, 1] = cell, margin
-    if margin >= 0.0 and cell + 1 < cells.rows.shape[0]:  # The next cell may begin now.
-        own_rows, after = cells.tables[cell, begin:end], cells.tables[cell + 1, begin:end]
-        write_jumps(own_rows, after, time, ON_TIME, led, led_robot, memory.jumps[begin:end])
-        memory.jumped[k] = cell + 1
-    memory.governors[k, 0] += departures.times[0] * governed[0]
-    memory.governors[k, 1] += departures.times[0] * governed[1]
-
-
-@compiled(inlined=True, borrows=True)
-def follow_axes(
-    k: int, sample: int, cell: int, time: float, cells: LoopCells, team: FusedTeam, nominal: LoopNominal,
-    departures: LoopDepartures, memory: LoopMemory, room: RobotRoom,
-) -> int:  # fmt: skip
-    """Write the effort of robot k and what the law of its axes asks for.
-
-    Args:
-        k: The robot.
-        sample: Number of the sample.
-        cell: The cell that it knows.
-        time: Time since its entry [s].
-        cells: The plan's cells.
-        team: The robots' models.
-        nominal: The nominal motions.
-        departures: What departs.
-        memory: What changes.
-        room: Holds the states of object and robot as the robot knows them, and the desired acceleration of
-            the object's origin; receives the accelerations of the law, and what the robot tells the log.
-
-    Returns:
-        The row of ``room.seen`` and of ``room.robots`` with the states on which the law acts, and by which
-        the robot is ready.
-    """
-    begin, end = k + team.first[2, k], k + 1 + team.first[2, k + 1]
-    size, fades, axes_led = 2 * (2 + end - begin), memory.jumped[k] == cell, nominal.axis_gains.size > 0
-    ring, mounting = memory.axes.shape[0], nominal.mountings[begin:end]
-    gains, lag, now = nominal.axis_gains, 0.0, memory.axes[sample % ring, :, begin:end]
-    linear, law, pulled, jumps = room.governed[2:], room.law[begin:end], room.law[begin:end], room.fading
-    led, wanted, own = 1 if axes_led else 0, room.told[COMMAND:], 3 * k + team.first[2, k]
-    for i in range(begin, end):
-        jumps[i] = memory.jumps[i] if fades else 0.0
-    if axes_led:
-        lag = gains[2]
-        _place(now, mounting, room.seen[0], room.robots[0, :size], room.seen[1], room.robots[1, :size])
-    track_axes(
-        cells.tables[cell, begin:end], time, ON_TIME, jumps[begin:end], room.seen[led],
-        room.robots[led, :size], law,
-    )  # fmt: skip
-    if axes_led:
-        then = memory.axes[max(sample - departures.periods[0], 0) % ring, :2, begin:end]
-        later, pulled = room.later[:, begin:end], room.pulled[begin:end]
-        pull_axes(law, room.seen[0], room.robots[0, :size], then, (gains[0], gains[1]), pulled)
-        carry_axes(now, law, 0.5 * departures.times[0] + lag, lag, later)
-        _place(later, mounting, room.seen[0], room.robots[0, :size], room.seen[2], room.robots[2, :size])
-    # Accelerations become efforts with the states of when these act.
-    acts = 2 if axes_led else 0
-    room.told[ACCELERATION], room.told[ACCELERATION + 1] = linear[0], linear[1]
-    room.told[ACCELERATION + 2] = pulled[0]
-    end_effector_command(team.loads[k], room.seen[acts], linear, pulled, wanted)
-    chain = team.chains[team.first[0, k] : team.first[0, k + 1]]
-    effort = memory.efforts[0, own : own + 2 + end - begin]
-    robot_effort(chain, room.motion, room.robots[acts, :size], wanted, pulled, effort)
-    return led
+    _place(now, mounting, seen[0], robots[0, :size], seen[1], robots[1, :size])
+    track_axes(table, time, ON_TIME, jumps, seen[1], robots[1, :size], law)
+    pull_axes(law, seen[0], robots[0, :size], then, (gains[0], gains[1]), pulled)
+    carry_axes(now, law, 0.5 * period + gains[2], gains[2], later)
+    _place(later, mounting, seen[0], robots[0, :size], seen[2], robots[2, :size])
 
 
 @compiled(borrows=True)
@@ -288,64 +312,8 @@ def _place(
 
 
 @compiled(inlined=True, borrows=True)
-def report(
-    k: int, sample: int, cell: int, time: float, seen: FloatArray, robot: FloatArray, cells: LoopCells,
-    nominal: LoopNominal, departures: LoopDepartures, memory: LoopMemory, begin: int, whole: bool,
-    shown: FloatArray,
-) -> float:  # fmt: skip
-    """Return the margin with which robot k is ready; of a negative one only its sign unless ``whole``.
-
-    Args:
-        k: This and the next three arguments are those of ``follow_axes``.
-        sample: Number of the sample.
-        cell: The cell.
-        time: Time since its entry [s].
-        seen: The object's state by which it judges, shape (6,).
-        robot: Its own, shape (2 (3 + n_k),).
-        cells: This and the next three arguments are those of ``follow_axes``.
-        nominal: The nominal motions.
-        departures: What departs.
-        memory: What changes.
-        begin: Its first row among all axes.
-        whole: Whether the margin is wanted that its blocks would report.
-        shown: Room for what ``show_nominal`` writes.
-    """
-    end, following = begin + robot.size // 2 - 2, cell + 1
-    if following == cells.rows.shape[0]:
-        axes, rows, own, first = robot.size // 2 - 2, memory.recent.shape[0], 2 * k + begin, k + begin
-        arrival = arrival_margin(
-            cells.places[own : own + 2 + axes], cells.rooms[0, first : first + 1 + axes],
-            cells.rooms[1, first : first + 1 + axes], memory.recent[:, own : own + 2 + axes],
-            (sample - 1) % rows,
-        )  # fmt: skip
-        led = memory.nominal[sample % memory.nominal.shape[0], : 4 if nominal.flow.size else 0]
-        table, axes_led = cells.tables[-1, begin : begin + axes], nominal.axis_gains.size > 0
-        return robot_arrived(table, cells.goal, cells.tolerance, axes_led, seen, robot, led, arrival)
-    own_rows, after = cells.tables[cell, begin:end], cells.tables[following, begin:end]
-    margin = axes_ready(own_rows, after, False, time, seen, robot)
-    if margin < 0.0 and not whole:  # the position is not judged in vain
-        return margin
-    edges = cells.governed[cells.first[0, following] : cells.first[0, following + 1]]
-    stiffness, inradius = cells.numbers[following, 1], cells.numbers[cell, 0]
-    if not nominal.flow.size:
-        return robot_ready(
-            own_rows, after, edges, stiffness, inradius, cells.goal, cells.tolerance, False, time, seen,
-            robot, memory.governors[k],
-        )  # fmt: skip
-    state = memory.nominal[sample % memory.nominal.shape[0]]
-    here = cells.governed[cells.first[0, cell] : cells.first[0, cell + 1]]
-    speed, periods = nominal.position[0], nominal.position[1]
-    period, target = departures.times[0], cells.numbers[cell, 3:]
-    show_nominal(here, cells.numbers[cell, 1], target, period, periods, speed, state, shown)
-    return robot_ready_along(
-        own_rows, after, edges, stiffness, inradius, cells.goal, cells.tolerance, False, time, seen, robot,
-        state[4:6], shown,
-    )  # fmt: skip
-
-
-@compiled(inlined=True, borrows=True)
-def judge(
-    k: int, sample: int, now: float, team: FusedTeam, cells: LoopCells, nominal: LoopNominal,
+def _monitor(
+    k: int, sample: int, now: float, team: LoopTeam, cells: LoopCells, nominal: LoopNominal,
     departures: LoopDepartures, memory: LoopMemory, room: RobotRoom, robot: FloatArray,
 ) -> None:  # fmt: skip
     """Write what the monitor of robot k says, by what it has measured.

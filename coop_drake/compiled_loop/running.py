@@ -13,6 +13,7 @@ from coop_drake.compiled_loop.arrays import (
     LoopDepartures,
     LoopMemory,
     LoopNominal,
+    LoopTeam,
     plant_room,
     robot_room,
     watch_room,
@@ -73,7 +74,6 @@ from coop_drake.plant.configuration import displacement
 from coop_drake.scenario import Deployment
 from coop_drake.systems.current_cell import READY_SIZE
 from coop_drake.systems.departure_monitor import LONG_AGO
-from coop_drake.systems.team_kernels import FusedTeam
 from coop_drake.tree.pose import FloatArray
 
 _USES = 8
@@ -164,7 +164,7 @@ def _silences(deployment: Deployment, names: tuple[str, ...]) -> FloatArray:
     return np.array(rows).T.copy()
 
 
-def believed(team: FusedTeam, mass_error: float) -> FusedTeam:
+def believed(team: LoopTeam, mass_error: float) -> LoopTeam:
     """Return the robots' models as they believe them to be: all masses and inertias wrong by a factor."""
     factor, chains, loads = 1.0 + mass_error, team.chains.copy(), team.loads.copy()
     chains[:, [MASS, INERTIA]] *= factor

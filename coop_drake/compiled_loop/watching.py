@@ -17,6 +17,7 @@ from coop_drake.compiled_loop.arrays import (
     LoopMemory,
     LoopNominal,
     LoopPlant,
+    LoopTeam,
     WatchRoom,
 )
 from coop_drake.compiled_loop.robots import heard_cell
@@ -24,8 +25,8 @@ from coop_drake.geometry.boundary import signed_distance
 from coop_drake.jit import compiled
 from coop_drake.laws.axis_table import bounds_of
 from coop_drake.simulation.clearance import pair_apart, piece_to_walls, place_pieces
-from coop_drake.systems.team_kernels import FusedTeam
 from coop_drake.tree.pose import FloatArray, IntArray
+from coop_drake.tree.team_arrays import TeamArrays
 
 ROUNDING = 1e-9
 """More than what rounding errors change of a distance and of the way of a run [m]."""
@@ -92,7 +93,7 @@ def end(figures: FloatArray, how: int, value: float, place: int = -1) -> None:
 
 @compiled(borrows=True)
 def watch(
-    sample: int, cells: LoopCells, team: FusedTeam, plant: LoopPlant, nominal: LoopNominal,
+    sample: int, cells: LoopCells, team: LoopTeam, plant: LoopPlant, nominal: LoopNominal,
     departures: LoopDepartures, memory: LoopMemory, room: WatchRoom, figures: FloatArray,
 ) -> None:  # fmt: skip
     """Measure every margin before the updates of a sample, and end the run where there is a reason.
@@ -108,35 +109,15 @@ def watch(
         room: What was measured last.
         figures: Receives the figures of the run.
     """
-    z, now = room.z, sample % memory.current.shape[0]
+    z, entered, before = room.z, memory.current[sample % memory.current.shape[0]], room.before
+    now, cell, robots, asked, most = sample * departures.times[0], int(entered[0]), team.yaws.size, False, 0
+    figures[SAMPLES], figures[CELL] = sample, cell
     for i in range(z.size):
         z[i] = memory.state[team.places[0, i]]
-    cell, time = int(memory.current[now, 0]), sample * departures.times[0] - memory.current[now, 1]
-    figures[SAMPLES], figures[CELL] = sample, cell
-    _watch_axes(sample, cell, cells, team, plant, nominal, departures, memory, z, figures)
-    _watch_distances(cell, cells, plant, room, figures)
-    _watch_efforts(team, nominal, memory, room.before, figures)
-    if cell + 1 == cells.rows.shape[0] and left_by_all(cell, memory.channels):
-        away = _share_of_tolerance(z, cells.places, cells.rooms, team.first)
-        end(figures, ARRIVED if away <= 1.0 else ASTRAY, away)
-    elif time > cells.numbers[cell, 2]:
-        end(figures, STALLED, time)
-    elif sample * departures.times[0] >= departures.times[1]:
-        end(figures, LATE, time)
 
-
-@compiled(inlined=True, borrows=True)
-def _watch_axes(
-    sample: int, cell: int, cells: LoopCells, team: FusedTeam, plant: LoopPlant, nominal: LoopNominal,
-    departures: LoopDepartures, memory: LoopMemory, z: FloatArray, figures: FloatArray,
-) -> None:  # fmt: skip
-    """Measure distances of axes to funnels and slices, and the departures of all from their nominal motions.
-
-    An axis uses the least distance to its funnel's bounds that the budget states over the one that it keeps.
-    The run ends where a distance is not positive.
-    """
+    # Distances of axes to funnels and slices. One uses the least distance to its funnel's bounds that the
+    # budget states over the one that it keeps.
     for i in range(z.size - 2):
-        now = sample * departures.times[0]
         heard, time = heard_cell(plant.axis_rows[1, i], sample, now, departures.hearing, memory.current)
         bounds = bounds_of(cells.tables[heard, plant.axis_rows[0, i]], time)
         margin = min(z[2 + i] - bounds[0], bounds[1] - z[2 + i])
@@ -150,86 +131,24 @@ def _watch_axes(
         margin = min(z[2 + i] - lower, upper - z[2 + i])
         if not margin > 0.0:
             end(figures, OUT_OF_SLICE, margin, i)
-    if not nominal.flow.size:
-        return
-    led = memory.nominal[sample % memory.nominal.shape[0]]
-    vx, vy = memory.state[team.places[1, 0]], memory.state[team.places[1, 1]]
-    _use(hypot(z[0] - led[0], z[1] - led[1]) / nominal.position[2], figures)
-    _use(hypot(vx - led[2], vy - led[3]) / nominal.position[3], figures)
-    if nominal.distances.size:
-        axes = memory.axes[sample % memory.axes.shape[0]]
-        for i in range(z.size - 2):
-            row, rate = plant.axis_rows[0, i], memory.state[team.places[1, 2 + i]]
-            _use(abs(z[2 + i] - axes[0, row]) / nominal.distances[1, cell, i], figures)
-            _use(abs(rate - axes[1, row]) / nominal.distances[2, cell, i], figures)
+    edges = cells.regions[cells.first[1, cell] : cells.first[1, cell + 1]]
+    _watch_distances(cell, edges, plant.shapes, plant.walls, plant.reach, room, figures)
 
+    # Departures of position, velocity, axes and their rates from their nominal motions.
+    if nominal.flow.size:
+        led = memory.nominal[sample % memory.nominal.shape[0]]
+        vx, vy = memory.state[team.places[1, 0]], memory.state[team.places[1, 1]]
+        _use(hypot(z[0] - led[0], z[1] - led[1]) / nominal.position[2], figures)
+        _use(hypot(vx - led[2], vy - led[3]) / nominal.position[3], figures)
+        if nominal.distances.size:
+            axes = memory.axes[sample % memory.axes.shape[0]]
+            for i in range(z.size - 2):
+                row, rate = plant.axis_rows[0, i], memory.state[team.places[1, 2 + i]]
+                _use(abs(z[2 + i] - axes[0, row]) / nominal.distances[1, cell, i], figures)
+                _use(abs(rate - axes[1, row]) / nominal.distances[2, cell, i], figures)
 
-@compiled(inlined=True, borrows=True)
-def _watch_distances(
-    cell: int, cells: LoopCells, plant: LoopPlant, room: WatchRoom, figures: FloatArray
-) -> None:
-    """Measure the distance to the cell's boundary and clearances; the run ends where one is not positive."""
-    z, last, way, team = room.z, room.region, room.way, plant.shapes
-    x, y = z[0], z[1]
-    if not (last[0] == cell and last[1] - hypot(x - last[2], y - last[3]) > figures[REGION] + ROUNDING):
-        edges = cells.regions[cells.first[1, cell] : cells.first[1, cell + 1]]
-        inside = signed_distance(edges, x, y)
-        last[0], last[1], last[2], last[3] = cell, inside, x, y
-        figures[REGION] = min(figures[REGION], inside)
-        if not inside > 0.0:
-            end(figures, OUT_OF_REGION, inside)
-    between = 0.0
-    for i in range(1, plant.reach.size):
-        between += plant.reach[i] * abs(z[2 + i] - room.last_z[2 + i])
-    moved = hypot(x - room.last_z[0], y - room.last_z[1]) + plant.reach[0] * abs(z[2] - room.last_z[2])
-    moved += between
-    if moved >= 0.0:  # Not NaN: there was a configuration before.
-        way[0] += moved
-        way[1] += 2.0 * between
-    for i in range(z.size):
-        room.last_z[i] = z[i]
-    placed = False
-    for i in range(len(team.pieces)):
-        if room.walls[i, 0] - (way[0] - room.walls[i, 1]) > figures[WALL] + ROUNDING:
-            continue
-        if not placed:
-            place_pieces(team, z, room.poses, room.vertices, room.discs)
-            placed = True
-        distance = piece_to_walls(team, room.vertices, room.discs, plant.walls, i, inf)
-        room.walls[i, 0], room.walls[i, 1] = distance, way[0]
-        figures[WALL] = min(figures[WALL], distance)
-    for i in range(len(team.pairs)):
-        if room.pairs[i, 0] - (way[1] - room.pairs[i, 1]) > figures[BODY] + ROUNDING:
-            continue
-        if not placed:
-            place_pieces(team, z, room.poses, room.vertices, room.discs)
-            placed = True
-        distance = pair_apart(team, room.vertices, room.discs, i, inf)
-        room.pairs[i, 0], room.pairs[i, 1] = distance, way[1]
-        figures[BODY] = min(figures[BODY], distance)
-    if not figures[WALL] > 0.0:
-        end(figures, AT_WALL, figures[WALL])
-    if not figures[BODY] > 0.0:
-        end(figures, AT_BODY, figures[BODY])
-
-
-@compiled(borrows=True)
-def _use(share: float, figures: FloatArray) -> None:
-    """Note which share was used of what the plan's budget states."""
-    if isnan(figures[SHARE]) or share > figures[SHARE]:
-        figures[SHARE] = share
-
-
-@compiled(inlined=True, borrows=True)
-def _watch_efforts(
-    team: FusedTeam, nominal: LoopNominal, memory: LoopMemory, before: FloatArray, figures: FloatArray
-) -> None:
-    """Measure efforts of all robots, the object's rotation, and what the robots' monitors say.
-
-    The run ends where a robot asks for a hold, which this loop lacks; the one that departs most is named.
-    ``before`` holds what it held at the last sample, and receives what there is now, see ``WatchRoom``.
-    """
-    robots, asked, most = team.yaws.size, False, 0
+    # Efforts of all robots, the object's rotation, and what the robots' monitors say: the run ends where one
+    # asks for a hold, which this loop lacks, and the robot is named that departs most.
     for k in range(robots):
         own = 3 * k + team.first[2, k]
         x, y = memory.efforts[1, own], memory.efforts[1, own + 1]
@@ -257,6 +176,70 @@ def _watch_efforts(
         figures[ROBOT] = most
         end(figures, HELD, memory.alarms[most, 1], int(memory.alarms[most, 2]))
 
+    time = now - entered[1]
+    if cell + 1 == cells.rows.shape[0] and left_by_all(cell, memory.channels):
+        away = _share_of_tolerance(z, cells.places, cells.rooms, team.first)
+        end(figures, ARRIVED if away <= 1.0 else ASTRAY, away)
+    elif time > cells.numbers[cell, 2]:
+        end(figures, STALLED, time)
+    elif now >= departures.times[1]:
+        end(figures, LATE, time)
+
+
+@compiled(borrows=True)
+def _watch_distances(
+    cell: int, edges: FloatArray, team: TeamArrays, walls: FloatArray, reach: FloatArray, room: WatchRoom,
+    figures: FloatArray,
+) -> None:  # fmt: skip
+    """Measure the distance to the cell's boundary and clearances; the run ends where one is not positive."""
+    z, last, way, x, y = room.z, room.region, room.way, room.z[0], room.z[1]
+    if not (last[0] == cell and last[1] - hypot(x - last[2], y - last[3]) > figures[REGION] + ROUNDING):
+        inside = signed_distance(edges, x, y)
+        last[0], last[1], last[2], last[3] = cell, inside, x, y
+        figures[REGION] = min(figures[REGION], inside)
+        if not inside > 0.0:
+            end(figures, OUT_OF_REGION, inside)
+    between = 0.0
+    for i in range(1, reach.size):
+        between += reach[i] * abs(z[2 + i] - room.last_z[2 + i])
+    moved = hypot(x - room.last_z[0], y - room.last_z[1]) + reach[0] * abs(z[2] - room.last_z[2])
+    moved += between
+    if moved >= 0.0:  # Not NaN: there was a configuration before.
+        way[0] += moved
+        way[1] += 2.0 * between
+    for i in range(z.size):
+        room.last_z[i] = z[i]
+    placed = False
+    for i in range(len(team.pieces)):
+        if room.walls[i, 0] - (way[0] - room.walls[i, 1]) > figures[WALL] + ROUNDING:
+            continue
+        if not placed:
+            place_pieces(team, z, room.poses, room.vertices, room.discs)
+            placed = True
+        distance = piece_to_walls(team, room.vertices, room.discs, walls, i, inf)
+        room.walls[i, 0], room.walls[i, 1] = distance, way[0]
+        figures[WALL] = min(figures[WALL], distance)
+    for i in range(len(team.pairs)):
+        if room.pairs[i, 0] - (way[1] - room.pairs[i, 1]) > figures[BODY] + ROUNDING:
+            continue
+        if not placed:
+            place_pieces(team, z, room.poses, room.vertices, room.discs)
+            placed = True
+        distance = pair_apart(team, room.vertices, room.discs, i, inf)
+        room.pairs[i, 0], room.pairs[i, 1] = distance, way[1]
+        figures[BODY] = min(figures[BODY], distance)
+    if not figures[WALL] > 0.0:
+        end(figures, AT_WALL, figures[WALL])
+    if not figures[BODY] > 0.0:
+        end(figures, AT_BODY, figures[BODY])
+
+
+@compiled(borrows=True)
+def _use(share: float, figures: FloatArray) -> None:
+    """Note which share was used of what the plan's budget states."""
+    if isnan(figures[SHARE]) or share > figures[SHARE]:
+        figures[SHARE] = share
+
 
 @compiled(borrows=True)
 def left_by_all(cell: int, channels: FloatArray) -> bool:
@@ -271,7 +254,7 @@ def left_by_all(cell: int, channels: FloatArray) -> bool:
 def _share_of_tolerance(z: FloatArray, places: FloatArray, rooms: FloatArray, first: IntArray) -> float:
     """Return how far object and joints are off the goal over what is tolerated, whatever was measured [-].
 
-    The other arguments are fields of ``LoopCells`` and of ``FusedTeam``.
+    The other arguments are fields of ``LoopCells`` and of ``LoopTeam``.
     """
     largest = 0.0
     for k in range(first.shape[1] - 1):

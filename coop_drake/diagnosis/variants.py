@@ -21,7 +21,7 @@ from coop_drake.planning.sampled_search import SampledSearch
 from coop_drake.planning.sampling.collision import densified
 from coop_drake.planning.transitions import path_through
 from coop_drake.progress import Progress
-from coop_drake.tree.levers import configuration_scale
+from coop_drake.tree.component_tree import configuration_scale
 from coop_drake.tree.pose import FloatArray
 
 # A proof that a given path of the whole team is free.

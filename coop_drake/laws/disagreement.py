@@ -9,8 +9,7 @@ import numpy as np
 from coop_drake.jit import compiled
 from coop_drake.laws.team_chain import frames_of, team_chain
 from coop_drake.laws.team_dynamics import TeamWork, team_accelerations, team_work
-from coop_drake.tree.bodies import Bodies
-from coop_drake.tree.component_tree import ComponentTree
+from coop_drake.tree.component_tree import Bodies, ComponentTree
 from coop_drake.tree.pose import FloatArray, IntArray
 
 

@@ -22,8 +22,7 @@ from coop_drake.laws.chain_motion import (
     X,
     Y,
 )
-from coop_drake.tree.bodies import Bodies
-from coop_drake.tree.component_tree import ComponentTree
+from coop_drake.tree.component_tree import Bodies, ComponentTree
 from coop_drake.tree.pose import FloatArray, PlanarPose
 
 

@@ -22,7 +22,7 @@ from coop_drake.geometry.passage import pole
 from coop_drake.geometry.swept_tree import Intervals, SweptTree
 from coop_drake.planning.cells.cells import CellMaker, FreeBox, Region, end_in, regions_of
 from coop_drake.planning.questions import disc_polygon, ending_at, is_patched, marginal_workspace, nearby
-from coop_drake.tree.circles import nearest_turn, turns_to
+from coop_drake.tree.component_tree import nearest_turn, turns_to
 from coop_drake.tree.pose import FloatArray
 
 

@@ -36,7 +36,7 @@ from coop_drake.planning.questions import SAME_END
 from coop_drake.planning.sampling.routes import local_question
 from coop_drake.planning.search import find_path
 from coop_drake.progress import Progress
-from coop_drake.tree.circles import nearest_turn
+from coop_drake.tree.component_tree import nearest_turn
 
 if TYPE_CHECKING:
     from coop_drake.planning.budget.tolerant import BeyondBudget

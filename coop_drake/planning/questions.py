@@ -20,8 +20,7 @@ from coop_drake.geometry import safeguards
 from coop_drake.geometry.convex import normals
 from coop_drake.geometry.minkowski import FreeSpace, to_polygon
 from coop_drake.geometry.parts import parts_of, polygon_rings
-from coop_drake.tree.circles import nearest_turn
-from coop_drake.tree.component_tree import Component, ComponentTree, TreeJoint
+from coop_drake.tree.component_tree import Component, ComponentTree, TreeJoint, nearest_turn
 from coop_drake.tree.pose import FloatArray
 
 # Checks of a question before the search: finite numbers of the right count, joints within their limits.

@@ -15,8 +15,7 @@ from coop_drake.plant.planar_chain import bodies_inertia, rotor_inertia
 from coop_drake.plant.scenario_digest import scenario_digest
 from coop_drake.plant.team import TeamPlant, build_team_plant
 from coop_drake.scenario import Floor, Messages, Scenario
-from coop_drake.tree.bodies import Bodies
-from coop_drake.tree.component_tree import ComponentTree
+from coop_drake.tree.component_tree import Bodies, ComponentTree
 from coop_drake.tree.pose import FloatArray
 from coop_drake.verification.runs import BodyMass, RunSetup
 

@@ -13,8 +13,7 @@ from coop_drake.scenario.deployment import Floor, JointFriction, RobotDepartures
 from coop_drake.scenario.document import read_file
 from coop_drake.scenario.model import Scenario
 from coop_drake.tree import ComponentTree
-from coop_drake.tree.bodies import Bodies
-from coop_drake.tree.levers import axis_levers
+from coop_drake.tree.component_tree import Bodies, axis_levers
 
 ALL = "all"
 """The choice that stands for the departures of the scenario's section ``deployment``."""

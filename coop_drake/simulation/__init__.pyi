@@ -1,9 +1,15 @@
 from .clearance import Clearance, TeamClearance
-from .invariants import ACCELERATION_TOLERANCE, WRENCH_TOLERANCE, Invariants, Margins
 from .maps import accuracy_rows, build_maps
-from .message_statistics import MessageStatistics, communication
 from .run import configure_simulator, run_loop, simulate
-from .telemetry import Sample
+from .telemetry import (
+    ACCELERATION_TOLERANCE,
+    WRENCH_TOLERANCE,
+    Invariants,
+    Margins,
+    MessageStatistics,
+    Sample,
+    communication,
+)
 
 __all__ = [
     "ACCELERATION_TOLERANCE",

@@ -1,4 +1,4 @@
-"""Simulates a plan: builds the closed loop, runs it and returns the log."""
+"""Simulates a plan: builds the closed loop, runs it, checks and records every accepted step."""
 
 from __future__ import annotations
 
@@ -6,24 +6,43 @@ import gc
 import logging
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import fields
+from math import inf
+from typing import Any
 
 import numpy as np
 from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorConfig
+from pydrake.systems.framework import Context, EventStatus
 
 from coop_drake.answers.log import SimulationLog
 from coop_drake.answers.plan import Plan
 from coop_drake.answers.plan_file import plan_digest
-from coop_drake.diagram import Loop, Replacements, build_closed_loop
+from coop_drake.diagram import Loop, Replacements, World, build_closed_loop
 from coop_drake.diagram.knowledge import arrival_goal
+from coop_drake.geometry.boundary import BoundaryDistance
 from coop_drake.harmonic_maps import HarmonicMap
-from coop_drake.plant import read_component_tree
+from coop_drake.laws.arrival import ArrivalGoal
+from coop_drake.laws.axis_table import ENERGY_BOUND, REST_RATE, axis_table, track_row
+from coop_drake.laws.departure import departing_name
+from coop_drake.laws.hand_over import governed_gains
+from coop_drake.laws.readiness import (
+    EROSION,
+    axis_ready,
+    clearance_margin,
+    funnel_margin,
+    interval_margin,
+    position_arrival,
+    rest_margin,
+)
+from coop_drake.plant import TeamPlant, read_component_tree
 from coop_drake.plant.scenario_digest import scenario_digest
 from coop_drake.progress import Progress
 from coop_drake.scenario import Scenario
 from coop_drake.simulation.clearance import TeamClearance
-from coop_drake.simulation.invariants import Invariants
-from coop_drake.simulation.telemetry import Sample
-from coop_drake.simulation.watch import Watch
+from coop_drake.simulation.telemetry import Invariants, Margins, Sample, Telemetry
+from coop_drake.systems.governor_kernels import cell_margin
+from coop_drake.systems.hold_supervisor import ASKED, BRAKED, SILENT, TOLD
+from coop_drake.tree.pose import FloatArray
 
 
 @contextmanager
@@ -42,9 +61,6 @@ def joint_limits_kept_by_funnels() -> Iterator[None]:
 
 def _matters(record: logging.LogRecord) -> bool:
     return "does not handle joint limits for continuous models" not in record.getMessage()
-
-
-# Simulates a plan: builds the closed loop, runs it and returns the log.
 
 
 def simulate(
@@ -163,3 +179,318 @@ def _advance(simulator: Simulator, watch: Watch, max_time: float) -> None:
         return
     if not watch.ended:
         watch.give_up(f"no arrival within max_time = {max_time:g} s")
+
+
+# When a run ends, and why.
+
+PATIENCE_FACTOR = 10.0
+"""A transition may take this many times its estimated time [-]: estimates are within a factor of two."""
+
+PATIENCE_ALLOWANCE = 20.0
+"""And this much longer [s], for transitions that are estimated at a fraction of a second."""
+
+
+def patience(plan: Plan, cell: int) -> float:
+    """Return the longest time that a transition is waited for [s]."""
+    return PATIENCE_FACTOR * plan.transitions[cell].estimated_time + PATIENCE_ALLOWANCE
+
+
+def blocking_margin(plan: Plan, sample: Sample, goal: ArrivalGoal) -> str:
+    """Return the condition that is furthest from being met in the current cell, as a phrase with its margin.
+
+    Args:
+        plan: The plan.
+        sample: The present instant.
+        goal: The goal of the whole team; the tolerances count, no errors.
+    """
+    if sample.held:
+        return f"the hold ends: {_causes_of(sample)}"
+    last = sample.cell == len(plan.cells) - 1
+    margins = _arrival(plan, sample, goal) if last else _readiness(plan, sample)
+    if last and min(margins.values()) >= 0.0 > min(sample.ready_margins):
+        k = int(np.argmin(sample.ready_margins))
+        return f"robot {k} measures that the goal is reached (margin {sample.ready_margins[k]:.3g})"
+    if min(margins.values()) >= 0.0:
+        return "the cell planner receives the robots' reports; all robots are ready"
+    name = min(margins, key=lambda key: margins[key])
+    return f"{name} (margin {margins[name]:.3g})"
+
+
+def _causes_of(sample: Sample) -> str:
+    """Return why the team is held, as a phrase."""
+    words = {
+        TOLD: "it is told so",
+        ASKED: "asks for it",
+        SILENT: "is not heard",
+        BRAKED: "lets the drives brake",
+    }
+    names = ["", *(f"robot {k} " for k in range(len(sample.causes) - 1))]
+    found = [name + words[cause] for name, cause in zip(names, sample.causes, strict=True) if cause]
+    return ", ".join(found)
+
+
+def narrowest_funnel(plan: Plan, sample: Sample) -> str:
+    """Return the axis that is nearest to a bound of its funnel, as a phrase with its margin and its rate."""
+    axes = sample.z[2:]
+    margins = np.minimum(axes - sample.funnel_lower, sample.funnel_upper - axes)
+    i = int(np.argmin(margins))
+    return f"{_axes(plan)[i]} (margin {margins[i]:.3g} rad or m, rate {sample.rates[2 + i]:.3g} per second)"
+
+
+def _axes(plan: Plan) -> tuple[str, ...]:
+    return ("the object's angle", *plan.joint_names)
+
+
+def _intervals(plan: Plan, sample: Sample) -> dict[str, float]:
+    transition = plan.transitions[sample.cell]
+    return {
+        f"{name} reaches its goal interval": interval_margin(position, lower, upper)
+        for name, position, lower, upper in zip(
+            _axes(plan), sample.z[2:], transition.goal_lower, transition.goal_upper, strict=True
+        )
+    }
+
+
+def _readiness(plan: Plan, sample: Sample) -> dict[str, float]:
+    following = sample.cell + 1
+    gains = plan.transitions[following].gains
+    stiffness = governed_gains(plan.governor_row(following), 0.0)[0]
+    margin = cell_margin(
+        BoundaryDistance(plan.governed(following)).edges,
+        stiffness,
+        np.concatenate([sample.z[:3], sample.rates[:3]]),
+        sample.governor_position,
+    )
+    margins = _intervals(plan, sample) if plan.transitions[sample.cell].gains.rest is None else {}
+    margins["the object's position is safe in the next cell (Delta E)"] = clearance_margin(
+        margin, stiffness, plan.transitions[sample.cell].inradius
+    )
+    own = axis_table(plan.funnel(sample.cell), plan.transitions[sample.cell].gains)
+    table = axis_table(plan.funnel(following), gains)
+    for i, name in enumerate(_axes(plan)):
+        if own[i, REST_RATE] > 0.0:
+            margins[f"{name} rests in the middle of its goal interval"] = axis_ready(
+                own[i], table[i], sample.z[2 + i], sample.rates[2 + i]
+            )
+            continue
+        energy = track_row(table[i], 0.0, sample.z[2 + i], sample.rates[2 + i])[1]
+        margins[f"the energy of {name} falls below the next funnel's bound"] = funnel_margin(
+            energy, table[i, ENERGY_BOUND]
+        )
+    return margins
+
+
+def off_goal(goal: ArrivalGoal, z: FloatArray) -> float:
+    """Return how far object and joints are from the goal, over what is tolerated, whatever was measured.
+
+    Args:
+        goal: That of the whole team.
+        z: Where they are, shape (3 + n,) [m, rad].
+    """
+    away = np.abs(z - goal.place)
+    return float(max(np.hypot(*away[:2]) / goal.tolerances[0], *(away[2:] / goal.tolerances[1:])))
+
+
+def _arrival(plan: Plan, sample: Sample, goal: ArrivalGoal) -> dict[str, float]:
+    tolerance, axes = float(goal.tolerances[0]), zip(_axes(plan), sample.z[2:], goal.place[2:], strict=True)
+    margins = {
+        f"{name} reaches its goal": 1.0 - abs(position - place) / ((1.0 - EROSION) * room)
+        for (name, position, place), room in zip(axes, goal.tolerances[1:], strict=True)
+        if room < inf
+    }
+    distance = float(np.hypot(*(sample.z[:2] - goal.place[:2])))
+    margins["the object reaches its goal position"] = position_arrival(distance, 0.0, tolerance)
+    speed = float(np.hypot(*sample.rates[:2]))
+    margins["the object and the joints come to rest"] = min(
+        position_arrival(0.0, speed, tolerance), rest_margin(float(np.abs(sample.rates[2:]).max()))
+    )
+    return margins
+
+
+# Collects samples and margins into a log.
+
+
+class Recorder:
+    """Collects the accepted steps of a run."""
+
+    def __init__(self) -> None:
+        self._rows: list[tuple[Sample, Margins]] = []
+
+    def add(self, sample: Sample, margins: Margins) -> None:
+        """Add one step."""
+        self._rows.append((sample, margins))
+
+    def to_log(self, **ends: Any) -> SimulationLog:
+        """Return the log of all steps.
+
+        Args:
+            ends: The log's fields from ``reached`` on, which are the same for all steps.
+        """
+        z, rates = self._column("z"), self._column("rates")
+        known = {field.name for kind in (Sample, Margins) for field in fields(kind)} - set(ends)
+        names = [field.name for field in fields(SimulationLog) if field.name in known]
+        arrays: dict[str, Any] = {name: self._column(name) for name in names}
+        return SimulationLog(
+            times=self._column("time"),
+            cell_index=self._column("cell").astype(np.int64),
+            transition_start=self._column("entry"),
+            object_pose=z[:, :3],
+            object_twist=rates[:, :3],
+            joints=z[:, 3:],
+            joint_rates=rates[:, 3:],
+            **arrays,
+            **ends,
+        )
+
+    def _column(self, name: str) -> FloatArray:
+        """Return a field of the margins of all steps, or else of their samples."""
+        rows = [margins if hasattr(margins, name) else sample for sample, margins in self._rows]
+        return np.array([getattr(row, name) for row in rows], dtype=float)
+
+
+# Checks and records every accepted step of a run, and decides when the run ends.
+
+
+class Watch:
+    """The simulator's monitor: called on every accepted step, it ends the run on arrival, violation or stall.
+
+    Args:
+        loop: The closed loop that runs.
+        invariants: What must hold.
+        goal: The goal of the whole team; the tolerances count, no errors.
+        root: Context of the whole diagram in the simulator.
+        progress: Called with the stage and the fraction done, if given.
+        observer: Called with every accepted step, if given.
+    """
+
+    def __init__(
+        self,
+        loop: Loop,
+        invariants: Invariants,
+        goal: ArrivalGoal,
+        root: Context,
+        progress: Callable[[str, float], None] | None,
+        observer: Callable[[Sample], None] | None = None,
+    ) -> None:
+        self.recorder = Recorder()
+        self.reached = False
+        self.violation = ""
+        self._loop, self._invariants = loop, invariants
+        self._progress, self._observer = progress, observer
+        self._telemetry = Telemetry(loop, root)
+        self._goal = goal
+        self._last: Sample | None = None
+        self._asked_since: float | None = None
+
+    @property
+    def ended(self) -> bool:
+        """Whether the run has ended."""
+        return self.reached or bool(self.violation)
+
+    def __call__(self, _: Context) -> EventStatus | None:
+        """Check and record one accepted step."""
+        sample = self._telemetry.read()
+        margins = self._invariants.check(sample)
+        self.recorder.add(sample, margins)
+        self._last = sample
+        self._report(sample)
+        if self._observer is not None:
+            self._observer(sample)
+        if isinstance(self._loop, World) and (self._loop.link.trouble or self._loop.link.stopped):
+            self._see_stop(sample, margins, self._loop.link.trouble)
+        elif margins.violation:
+            self.violation = margins.violation
+        elif (asking := self._beyond_holding(sample)) is not None:
+            self.violation = f"at t = {sample.time:.6g} s in cell {sample.cell}: {asking}"
+        elif sample.arrived:
+            self._see_arrival(sample)
+        elif sample.time - sample.entry - sample.clock_lag > patience(self._loop.plan, sample.cell):
+            self.give_up("stalled")
+        if not self.ended:
+            return None
+        return EventStatus.ReachedTermination(self._loop.diagram, self.violation or "arrived")
+
+    def _beyond_holding(self, sample: Sample) -> str | None:
+        """Return why a robot's monitor ends the run, None where it does not.
+
+        The drives brake where a departure grows on. A loop without a supervisor cannot be held. A team
+        that is held for long by its own monitors will not go on.
+        """
+        if not sample.causes.size:
+            asking = np.flatnonzero(sample.alarms[:, 0]).tolist()
+        else:
+            asking = [k for k, cause in enumerate(sample.causes[1:]) if cause == ASKED]
+        braking = [k for k, cause in enumerate(sample.causes[1:]) if cause == BRAKED]
+        since = sample.time if self._asked_since is None else self._asked_since
+        self._asked_since = since if asking else None
+        team, plan = self._loop.team, self._loop.plan
+        if braking:
+            return f"{_names(team, braking)} lets the drives brake{_departing(team, plan, sample)}"
+        if asking and not sample.causes.size:
+            return f"{_names(team, asking)} asks for a hold{_departing(team, plan, sample)}"
+        if asking and sample.time - since > PATIENCE_ALLOWANCE:
+            long = f"has asked for a hold since t = {since:.6g} s"
+            return f"{_names(team, asking)} {long}{_departing(team, plan, sample)}"
+        return None
+
+    def _see_arrival(self, sample: Sample) -> None:
+        """End the run of a team that says that it has arrived: whether that is so, the world's poses tell."""
+        away = off_goal(self._goal, sample.z)
+        self.reached = away <= 1.0
+        if not self.reached:
+            x, y, angle = sample.z[:3] - self._goal.place[:3]
+            self.violation = (
+                f"at t = {sample.time:.6g} s the team says that it has arrived, but is {away:.3g} times the "
+                f"tolerance off the goal: the object by {np.hypot(x, y):.3g} m and {abs(angle):.3g} rad"
+            )
+
+    def _see_stop(self, sample: Sample, margins: Margins, trouble: str) -> None:
+        """Watch a team that does not follow the plan for contacts, until it does so again or cannot go on."""
+        if not min(margins.workspace_clearance, margins.body_clearance) > 0.0:
+            self.violation = f"{trouble or 'while the drives braked'}; {margins.violation}"
+        elif trouble:
+            self.violation = f"{trouble}, without contact"
+
+    def give_up(self, why: str) -> None:
+        """End the run without arrival; the message names the condition that was not met.
+
+        Args:
+            why: What happened, for example ``stalled``.
+        """
+        self._end(why, lambda plan, last: f"it waits until {blocking_margin(plan, last, self._goal)}")
+
+    def fail(self, why: str) -> None:
+        """End a run that cannot be integrated further; the message names the axis nearest to a bound."""
+        self._end(why, lambda plan, last: f"next to break was the funnel of {narrowest_funnel(plan, last)}")
+
+    def _end(self, why: str, explanation: Callable[[Plan, Sample], str]) -> None:
+        if self._last is None:
+            self.violation = why
+            return
+        sample, plan = self._last, self._loop.plan
+        self.violation = (
+            f"{why} at t = {sample.time:.6g} s in cell {sample.cell} of {len(plan.cells)}, entered at "
+            f"{sample.entry:.6g} s with {plan.transitions[sample.cell].estimated_time:.3g} s estimated; "
+            f"{explanation(plan, sample)}"
+        )
+
+    def _report(self, sample: Sample) -> None:
+        if self._progress is None:
+            return
+        estimate = self._loop.plan.transitions[sample.cell].estimated_time
+        within = 1.0 if sample.arrived else min(0.99, (sample.time - sample.entry) / max(estimate, 1e-9))
+        self._progress("simulating", (sample.cell + within) / len(self._loop.plan.cells))
+
+
+def _names(team: TeamPlant, robots: Sequence[int]) -> str:
+    return " and ".join(team.robots[k].name for k in robots)
+
+
+def _departing(team: TeamPlant, plan: Plan, sample: Sample) -> str:
+    """Return what departs the most from its nominal motion, as a clause; nothing where no monitor looks."""
+    if not sample.alarms.size:
+        return ""
+    k = int(np.argmax(sample.alarms[:, 1]))
+    robot, (_, share, check) = team.robots[k], sample.alarms[k].tolist()
+    what = departing_name(int(check), plan.joint_names[robot.q_slice])
+    return f": {what} departs {share:.3g} times as far as its level allows, as {robot.name} measures it"

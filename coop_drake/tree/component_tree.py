@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from math import cos, hypot, inf, pi, sin
+from math import cos, hypot, inf, log2, pi, sin
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
 from coop_drake.tree.pose import FloatArray, PlanarPose
+from coop_drake.typed_data import Number
 
 if TYPE_CHECKING:
     from coop_drake.tree.team_arrays import TeamArrays
@@ -55,7 +56,7 @@ class TreeJoint:
     - to its plant: ``plant/chain.py`` (``MOVABLE``, which refuses all other kinds), ``component_tree.py``,
       ``planarity.py``, ``joint_survey.py``, ``fixing.py`` and ``planar_chain.py``, all in ``plant/``;
     - to its geometry: ``unit`` below, ``ComponentTree.reach``, ``tree/team_arrays.py`` (its pose) and
-      ``tree/levers.py``; ``geometry/sweep_kernels.py`` and ``swept_tree.py`` (over-sweeps),
+      ``tree/component_tree.py``; ``geometry/sweep_kernels.py`` and ``swept_tree.py`` (over-sweeps),
       ``geometry/under_kernels.py`` (under-sweeps);
     - to the control laws: ``laws/robot_dynamics.py`` (velocities and forces);
     - to the planner: ``answers/problem.py`` (room beyond limits), ``planning/cells/splitting.py``
@@ -245,3 +246,144 @@ class ComponentTree:
                 slide = slide if joint.kind == "prismatic" else 0.0
                 own += hypot(joint.X_PJ.x, joint.X_PJ.y) + slide
         return own
+
+
+# Circular axes: theta and every joint without limits, on which values that differ by whole turns are one.
+
+
+def nearest_turn(angle: float) -> float:
+    """The same angle modulo 2 pi in [-pi, pi)."""
+    return (angle + pi) % (2.0 * pi) - pi
+
+
+def whole_turns(values: FloatArray, near: FloatArray) -> FloatArray:
+    """Whole turns that bring angles nearest to others, exactly zero where they are; any shape [rad]."""
+    return 2.0 * pi * np.rint((near - values) / (2.0 * pi))
+
+
+def turns_to(values: Sequence[float], near: Sequence[float], circular: Sequence[bool]) -> FloatArray:
+    """Whole turns that bring values of axes nearest to others; zero on axes that are no circles.
+
+    Args:
+        values: Values of (theta, q...), length 1 + n [rad, m].
+        near: Others.
+        circular: Which axes are circles.
+
+    Returns:
+        What to add to the values, shape (1 + n,) [rad, m].
+    """
+    both = zip(values, near, circular, strict=True)
+    return np.array([there + nearest_turn(here - there) - here if on else 0.0 for here, there, on in both])
+
+
+# The metric between configurations, and the unit of length in which a team has the usual size.
+
+_USUAL_SIZE = 0.25
+"""Mean radius of a usual team's convex pieces [m]; steps and resolutions of the search are meant for it."""
+
+_UNUSUAL = 1.5
+"""Octaves of size within which a team counts as usual [-]."""
+
+
+def usual_unit(tree: ComponentTree) -> float:
+    """Length in which a team has the usual size: 1 m unless it is about three times larger or smaller.
+
+    It is a power of two, so that no length is rounded when its unit changes.
+    """
+    shapes = [shape for component in tree.components for body in component.bodies for shape in body.shapes]
+    sizes = [float(np.hypot(*np.ptp(shape.vertices, axis=0))) / 2.0 + shape.radius for shape in shapes]
+    size = float(np.mean(sizes)) if sizes else 0.0
+    octaves = log2(size / _USUAL_SIZE) if size > 0.0 else 0.0
+    return 1.0 if abs(octaves) <= _UNUSUAL else 2.0 ** round(octaves)
+
+
+# How far the team moves per unit of each axis; the metric between configurations.
+
+_LEAST_LEVER = 0.01
+"""A joint that moves no solid body counts this much in distances [m per unit]: it still has to be moved."""
+
+
+def axis_levers(tree: ComponentTree) -> tuple[float, ...]:
+    """Largest distance that any carried point moves per unit of each axis (theta, q...).
+
+    In m/rad for an angle; without a unit for a prismatic joint.
+    """
+    reaches = [0.0] * len(tree.components)
+    levers = [0.0] * (1 + len(tree.joints))
+    for index in range(len(tree.components) - 1, -1, -1):
+        component = tree.components[index]
+        own = max(
+            (
+                float((shape.vertices**2).sum(axis=1).max() ** 0.5) + shape.radius
+                for body in component.bodies
+                for shape in body.shapes
+            ),
+            default=0.0,
+        )
+        reaches[index] = max(reaches[index], own)
+        joint = component.joint
+        if joint is None or component.parent is None:
+            levers[0] = reaches[index]
+            continue
+        length = (joint.axis[0] ** 2 + joint.axis[1] ** 2) ** 0.5
+        revolute = joint.kind == "revolute"
+        levers[1 + joint.index] = reaches[index] if revolute else length
+        slide = 0.0 if revolute else length * max(abs(joint.lower), abs(joint.upper))
+        offset = (joint.X_PJ.x**2 + joint.X_PJ.y**2) ** 0.5
+        reaches[component.parent] = max(reaches[component.parent], offset + slide + reaches[index])
+    return tuple(levers)
+
+
+def configuration_scale(tree: ComponentTree) -> FloatArray:
+    """What a unit of each axis of z counts in distances between configurations, shape (3 + n,) [m/unit].
+
+    It is the lever, but at least ``_LEAST_LEVER``: a joint that moves no solid body still has to be moved.
+    """
+    return np.maximum([1.0, 1.0, *axis_levers(tree)], _LEAST_LEVER)
+
+
+def point_levers(tree: ComponentTree, component: int, point: tuple[float, float]) -> FloatArray:
+    """Bound how far a point of a component moves per unit of (theta, q...), in all configurations.
+
+    Args:
+        tree: The team.
+        component: Index of the component.
+        point: In the component's frame [m].
+
+    Returns:
+        Shape (1 + n,), in m/rad for an angle and without a unit for a prismatic joint; 0 for joints that do
+        not move the point.
+    """
+    levers, reach = np.zeros(1 + len(tree.joints)), hypot(*point)
+    for index in tree.ancestors[component]:
+        joint = tree.components[index].joint
+        if joint is None:
+            levers[0] = reach
+            continue
+        along = hypot(*joint.axis)
+        levers[1 + joint.index] = reach if joint.kind == "revolute" else along
+        slide = 0.0 if joint.kind == "revolute" else along * max(abs(joint.lower), abs(joint.upper))
+        reach += slide + hypot(joint.X_PJ.x, joint.X_PJ.y)
+    return levers
+
+
+def turn_levers(tree: ComponentTree, component: int) -> FloatArray:
+    """Return by how much a component turns at most per unit of (theta, q...), shape (1 + n,) [-]."""
+    levers = np.zeros(1 + len(tree.joints))
+    levers[0] = 1.0
+    for index in tree.ancestors[component]:
+        joint = tree.components[index].joint
+        if joint is not None and joint.kind == "revolute":
+            levers[1 + joint.index] = 1.0
+    return levers
+
+
+# Mass properties of the bodies of a team, as budgets state them.
+
+BODY = "component", "mass", "x", "y", "inertia", "robot"
+"""What is stated of a body: index of its component in the team's tree, mass [kg], centre of mass in the
+component's frame [m], inertia about the vertical axis through it [kg m^2], and the index of the robot that
+moves it. The object stands there once for each robot, with the robot's share of its mass and inertia."""
+
+Bodies = tuple[tuple[Number, ...], ...]
+"""The bodies of a team, each with the numbers of ``BODY``; laws of the whole team need no robots."""

@@ -18,8 +18,7 @@ from coop_drake.laws import GainSet, ScheduledGains, TransitionGains, transition
 from coop_drake.laws.gain_schedule import schedule_of
 from coop_drake.laws.gains import IDEAL_AGE, RestCondition
 from coop_drake.planning.duration import estimated
-from coop_drake.tree.component_tree import ComponentTree
-from coop_drake.tree.levers import usual_unit
+from coop_drake.tree.component_tree import ComponentTree, usual_unit
 from coop_drake.tree.pose import FloatArray
 from coop_drake.verification.checks import Check
 from coop_drake.verification.kinematics import component_stages

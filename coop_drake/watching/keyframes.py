@@ -21,7 +21,7 @@ from coop_drake.planning.cells.cells import Region
 from coop_drake.planning.cells.exploration import Verdict
 from coop_drake.planning.cells.graph import Kind
 from coop_drake.planning.cells.slices import holds, share_facet
-from coop_drake.tree.circles import nearest_turn, turns_to
+from coop_drake.tree.component_tree import nearest_turn, turns_to
 from coop_drake.tree.pose import FloatArray
 from coop_drake.watching.recording import BOXES, SearchRecording
 from coop_drake.watching.search_states import ChannelCell, Leaf, SearchState, search_states

@@ -7,7 +7,7 @@ from coop_drake.answers.digest import problem_digest
 from coop_drake.errors import ScenarioError
 from coop_drake.plant import planning_problem
 from coop_drake.scenario import load_scenario
-from coop_drake.tree.levers import point_levers, turn_levers
+from coop_drake.tree.component_tree import point_levers, turn_levers
 from tests.support.edited_scenario import check_refusal, shipped, write_edited, write_with_robot
 from tests.support.robot_models import Arm, urdf_arm
 

@@ -14,7 +14,7 @@ from coop_drake.errors import ScenarioError
 from coop_drake.plant import planning_problem
 from coop_drake.plant.budgets import budget_of
 from coop_drake.scenario import Deployment, Measurements
-from coop_drake.tree.levers import axis_levers
+from coop_drake.tree.component_tree import axis_levers
 from tests.support.cli import invoke
 from tests.support.scenarios import write_scenario
 

@@ -25,8 +25,8 @@ from coop_drake.planning.box_crossing import cross_box, object_motion
 from coop_drake.planning.duration import cross_cell
 from coop_drake.plant import set_configuration
 from coop_drake.scenario import Deployment
+from coop_drake.simulation.run import blocking_margin
 from coop_drake.simulation.telemetry import Telemetry
-from coop_drake.simulation.watch import blocking_margin
 from tests.support.small_loop import small_maps, small_problem
 from tests.support.small_plan import POSITION_TOLERANCE
 

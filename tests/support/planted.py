@@ -13,8 +13,7 @@ from shapely.geometry.base import BaseGeometry
 
 from coop_drake.answers.problem import PlannerSettings, PlanningProblem
 from coop_drake.planning.sampling.collision import densified
-from coop_drake.tree.component_tree import ComponentTree
-from coop_drake.tree.levers import configuration_scale
+from coop_drake.tree.component_tree import ComponentTree, configuration_scale
 from tests.support.free_positions import FreePositions
 from tests.support.trees import placed_shape, trees
 

@@ -23,11 +23,12 @@ from coop_drake.compiled_loop.arrays import (
     LoopDepartures,
     LoopMemory,
     LoopNominal,
+    LoopTeam,
     RobotRoom,
     robot_room,
 )
 from coop_drake.compiled_loop.loop import update
-from coop_drake.compiled_loop.robots import compute, heard_cell, measure
+from coop_drake.compiled_loop.robots import compute, heard_cell, read_own
 from coop_drake.compiled_loop.running import believed, departures_of, memory_of, nominal_of
 from coop_drake.compiled_loop.watching import left_by_all
 from coop_drake.diagram.station import (
@@ -52,7 +53,6 @@ from coop_drake.simulation.telemetry import Sample
 from coop_drake.systems import Block
 from coop_drake.systems.departure_monitor import ALARM_SIZE
 from coop_drake.systems.nominal_kernels import nominal_margin
-from coop_drake.systems.team_kernels import FusedTeam, read_own
 from coop_drake.tree.pose import FloatArray, IntArray
 
 SHOWN = 20
@@ -65,7 +65,7 @@ POSE, GOVERNOR, MARGIN, READY, ALARM, WANTED = 0, 3, 5, 6, 8, 11
 
 @compiled
 def tell(
-    cells: LoopCells, team: FusedTeam, nominal: LoopNominal, departures: LoopDepartures, room: RobotRoom,
+    cells: LoopCells, team: LoopTeam, nominal: LoopNominal, departures: LoopDepartures, room: RobotRoom,
     memory: LoopMemory, sample: int, number: int, now: float, instant: FloatArray, shown: FloatArray,
     bounds: FloatArray,
 ) -> None:  # fmt: skip
@@ -89,24 +89,23 @@ def tell(
     cell = int(current[0])
     arrived = cell + 1 == cells.rows.shape[0] and left_by_all(cell, memory.channels)
     instant[0], instant[1], instant[2] = current[0], current[1], 1.0 if arrived else 0.0
-    robot, told = np.empty(memory.state.size), room.told
-    measure(sample, number, team, departures, memory, room)
+    robot = np.empty(memory.state.size)
+    compute(sample, number, now, True, cells, team, nominal, departures, room, memory)
     led = memory.nominal[sample % memory.nominal.shape[0]]
     for k in range(robots):
         row, begin = shown[k], k + team.first[2, k]
         end = begin + 1 + team.first[2, k + 1] - team.first[2, k]
         heard, time = heard_cell(k, sample, now, departures.hearing, memory.current)
-        read_own(k, team.places, team.first, team.base_chains, team.yaws, room.motion, memory.state, robot)
+        read_own(k, team.places, team.first, team.base_chains, team.yaws[k], room.motion, memory.state, robot)
         row[POSE : POSE + 3] = robot[:3]
         row[GOVERNOR : GOVERNOR + 2] = led[4:6] if nominal.flow.size else memory.governors[k]
-        compute(k, sample, number, now, True, cells, team, nominal, departures, room, memory)
-        row[MARGIN] = told[ENERGY]
+        row[MARGIN] = room.told[k, ENERGY]
         if nominal.flow.size:
             edges = cells.governed[cells.first[0, heard] : cells.first[0, heard + 1]]
             row[MARGIN] = nominal_margin(edges, cells.numbers[heard, 1], led)
         row[READY : READY + 2] = memory.reports[0, k]
         row[ALARM : ALARM + 3] = memory.alarms[k, :3]
-        row[WANTED:] = told[ACCELERATION : COMMAND + 6]
+        row[WANTED:] = room.told[k, ACCELERATION : COMMAND + 6]
         own = np.empty(2 * (end - begin))
         write_bounds(cells.tables[heard, begin:end], time, own)
         bounds[0, begin:end], bounds[1, begin:end] = own[: end - begin], own[end - begin :]
@@ -139,7 +138,7 @@ class SampledTeam(Block):
     """
 
     def __init__(
-        self, cells: LoopCells, team: FusedTeam, nominal: LoopNominal, departures: LoopDepartures,
+        self, cells: LoopCells, team: LoopTeam, nominal: LoopNominal, departures: LoopDepartures,
         memory: LoopMemory,
     ) -> None:  # fmt: skip
         super().__init__()

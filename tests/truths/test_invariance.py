@@ -12,8 +12,7 @@ from coop_drake.answers.problem import PlanningProblem
 from coop_drake.planning.channel import Channel
 from coop_drake.planning.search import find_channel
 from coop_drake.plant.chain import planar_pose
-from coop_drake.tree.circles import nearest_turn
-from coop_drake.tree.component_tree import TreeJoint
+from coop_drake.tree.component_tree import TreeJoint, nearest_turn
 from coop_drake.verification.answer import same_angle
 from tests.support.cases import team_tree
 from tests.support.moved import Similarity

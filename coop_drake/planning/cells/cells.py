@@ -20,7 +20,7 @@ from coop_drake.geometry.minkowski import FreeSpace, to_polygon
 from coop_drake.geometry.safeguards import components, meet, shared
 from coop_drake.geometry.squeeze_kernels import convex_hull, squeezed
 from coop_drake.geometry.swept_tree import Intervals, SweptTree
-from coop_drake.tree.circles import nearest_turn
+from coop_drake.tree.component_tree import nearest_turn
 from coop_drake.tree.pose import FloatArray, PlanarPose
 
 # Positions at which walls on either side hold two round pieces so near to each other that these overlap.

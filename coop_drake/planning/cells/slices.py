@@ -10,8 +10,7 @@ from dataclasses import dataclass, field
 from math import pi
 
 from coop_drake.geometry.swept_tree import Interval, Intervals
-from coop_drake.tree.circles import nearest_turn
-from coop_drake.tree.component_tree import ComponentTree
+from coop_drake.tree.component_tree import ComponentTree, nearest_turn
 
 TOUCH = 1e-9
 """Intervals that overlap or miss each other by no more than this touch [rad or m]: it absorbs rounding."""

@@ -12,7 +12,7 @@ from coop_drake.geometry.swept_tree import Intervals
 from coop_drake.planning.cells.cells import CellMaker, Region
 from coop_drake.planning.cells.graph import GraphCell, Kind
 from coop_drake.planning.cells.slices import Slices, halves, holds, meets, share_facet
-from coop_drake.tree.levers import axis_levers
+from coop_drake.tree.component_tree import axis_levers
 
 # Strong branching: halve a cell of a path on trial, and see what remains of the path.
 

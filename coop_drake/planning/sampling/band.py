@@ -26,8 +26,7 @@ from coop_drake.planning.sampling.sampler import (
     Sampler,
     SubsystemHierarchy,
 )
-from coop_drake.tree.component_tree import ComponentTree
-from coop_drake.tree.levers import configuration_scale
+from coop_drake.tree.component_tree import ComponentTree, configuration_scale
 from coop_drake.tree.pose import FloatArray
 from coop_drake.tree.team_arrays import TeamArrays, place_into
 

@@ -17,7 +17,7 @@ from coop_drake.jit import compiled
 from coop_drake.planning.questions import nearby
 from coop_drake.planning.sampling.band import clearances, improve
 from coop_drake.planning.sampling.collision import densified, first_collision, grid_for_team, is_free
-from coop_drake.tree.levers import configuration_scale
+from coop_drake.tree.component_tree import configuration_scale
 from coop_drake.tree.pose import FloatArray, IntArray
 from coop_drake.tree.team_arrays import TeamArrays, moved, place
 

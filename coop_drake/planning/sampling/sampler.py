@@ -19,8 +19,7 @@ from coop_drake.planning.sampling.collision import (
     is_free,
 )
 from coop_drake.planning.sampling.trees import GuidePath, SampledRegion, connect, shortened
-from coop_drake.tree.component_tree import Body, Component, ComponentTree, ConvexShape
-from coop_drake.tree.levers import configuration_scale
+from coop_drake.tree.component_tree import Body, Component, ComponentTree, ConvexShape, configuration_scale
 from coop_drake.tree.pose import FloatArray
 from coop_drake.tree.team_arrays import TeamArrays, place
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from coop_drake.answers.budget import Budget
 from coop_drake.errors import RefusalError, shortened
-from coop_drake.tree.bodies import Bodies
+from coop_drake.tree.component_tree import Bodies
 from coop_drake.verification.checks import Check
 
 SAME = 1e-9
