@@ -53,15 +53,16 @@ def run_loop(
         figures: What ``begin_figures`` gives; receives the figures of the run, see ``watching``.
     """
     sample = 0
-    watch(sample, cells, team, plant, nominal, departures, memory, seen, figures)
-    while figures[ENDED] == RUNS:
+    while True:
+        watch(sample, cells, team, plant, nominal, departures, memory, seen, figures)
+        if figures[ENDED] != RUNS:
+            break
         update(cells, team, nominal, departures, room, memory, sample)
         advance(sample, team, plant, departures, memory, motion)
         sample += 1
-        watch(sample, cells, team, plant, nominal, departures, memory, seen, figures)
 
 
-@compiled(borrows=True)
+@compiled(inlined=True, borrows=True)
 def update(
     cells: LoopCells, team: LoopTeam, nominal: LoopNominal, departures: LoopDepartures, room: RobotRoom,
     memory: LoopMemory, sample: int,
@@ -120,7 +121,7 @@ def update(
                 channels[k, i, j] = arrivals[i, j]
 
 
-@compiled(borrows=True)
+@compiled(inlined=True, borrows=True)
 def advance(
     sample: int, team: LoopTeam, plant: LoopPlant, departures: LoopDepartures, memory: LoopMemory,
     room: MotionRoom,

@@ -91,7 +91,7 @@ def end(figures: FloatArray, how: int, value: float, place: int = -1) -> None:
         figures[ENDED], figures[VALUE], figures[PLACE] = how, value, place
 
 
-@compiled(borrows=True)
+@compiled(inlined=True, borrows=True)
 def watch(
     sample: int, cells: LoopCells, team: LoopTeam, plant: LoopPlant, nominal: LoopNominal,
     departures: LoopDepartures, memory: LoopMemory, room: WatchRoom, figures: FloatArray,
@@ -186,7 +186,7 @@ def watch(
         end(figures, LATE, time)
 
 
-@compiled(borrows=True)
+@compiled(inlined=True, borrows=True)
 def _watch_distances(
     cell: int, edges: FloatArray, team: TeamArrays, walls: FloatArray, reach: FloatArray, room: WatchRoom,
     figures: FloatArray,
