@@ -89,7 +89,7 @@ def tell(
     cell = int(current[0])
     arrived = cell + 1 == cells.rows.shape[0] and left_by_all(cell, memory.channels)
     instant[0], instant[1], instant[2] = current[0], current[1], 1.0 if arrived else 0.0
-    robot = np.empty(memory.state.size)
+    robot, governors = np.empty(memory.state.size), memory.governors.copy()
     compute(sample, number, now, True, cells, team, nominal, departures, room, memory)
     led = memory.nominal[sample % memory.nominal.shape[0]]
     for k in range(robots):
@@ -98,7 +98,7 @@ def tell(
         heard, time = heard_cell(k, sample, now, departures.hearing, memory.current)
         read_own(k, team.places, team.first, team.base_chains, team.yaws[k], room.motion, memory.state, robot)
         row[POSE : POSE + 3] = robot[:3]
-        row[GOVERNOR : GOVERNOR + 2] = led[4:6] if nominal.flow.size else memory.governors[k]
+        row[GOVERNOR : GOVERNOR + 2] = led[4:6] if nominal.flow.size else governors[k]
         row[MARGIN] = room.told[k, ENERGY]
         if nominal.flow.size:
             edges = cells.governed[cells.first[0, heard] : cells.first[0, heard + 1]]
