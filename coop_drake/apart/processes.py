@@ -8,7 +8,6 @@ import pickle
 import signal
 import subprocess
 import sys
-import time as clocks
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from multiprocessing import get_context
@@ -26,7 +25,7 @@ from coop_drake.apart import REJOIN, RESTARTS
 from coop_drake.apart.faults import NO_FAULTS, Faults
 from coop_drake.apart.membership import TOLERATED, Processes
 from coop_drake.apart.messages import SUPERVISOR, WORLD, Goodbye, name_of
-from coop_drake.apart.node import TURN, NodeProcess
+from coop_drake.apart.node import NodeProcess
 from coop_drake.apart.robot import RobotNode, RobotProcess, certified_age
 from coop_drake.apart.supervisor import SupervisorNode, SupervisorProcess
 from coop_drake.apart.team_files import AddressBook, KeyPair, local_book
@@ -35,7 +34,7 @@ from coop_drake.apart.world import PATIENCE, Pacing, SampleExchange
 from coop_drake.diagram import brakes_of, build_world, control_period
 from coop_drake.diagram.knowledge import hold_of, robot_knowledge
 from coop_drake.diagram.station import build_station
-from coop_drake.errors import CoopDrakeError, MessagingError
+from coop_drake.errors import CoopDrakeError
 from coop_drake.harmonic_maps import HarmonicMap
 from coop_drake.interrupts import uninterrupted
 from coop_drake.plant import build_team_plant
@@ -268,7 +267,7 @@ def run_world(
         observer: Called with every accepted step.
 
     Raises:
-        MessagingError: Somebody is missing.
+        MessagingError: Somebody is missing at the start.
     """
     ends, outcome = Ends(network, WORLD), INTERRUPTED
     known, every = processes or Processes(), max(1, round(_REPORTED / network.period))
@@ -295,7 +294,7 @@ def run_world(
     if pacing is not None:
         gc.freeze()  # To collect garbage among all that was imported takes a tenth of a second.
     try:
-        _open(ends, opening, known)
+        ends.open(opening, known.gone)
         log = run_loop(world, scenario, progress=progress, observer=observer)
         report(exchange.facts())
         outcome = ARRIVED if log.reached and not log.violation else FAILED
@@ -307,24 +306,6 @@ def run_world(
         world.release()
         if pacing is not None:
             gc.unfreeze()
-
-
-def _open(ends: Ends, limit: float, processes: Processes) -> None:
-    """Wait for everybody.
-
-    Raises:
-        MessagingError: Somebody does not come in time, or has ended.
-    """
-    deadline = clocks.monotonic() + limit
-    while True:
-        try:
-            return ends.open(min(TURN, limit))
-        except MessagingError as error:
-            if ended := processes.gone():
-                names = ", ".join(name_of(index) for index in sorted(ended))
-                raise MessagingError(f"the process of {names} ended before the start") from error
-            if clocks.monotonic() > deadline:
-                raise MessagingError(f"{error}, {limit:g} s in all") from error
 
 
 def simulate_in_processes(

@@ -514,7 +514,7 @@ class RobotProcess(NodeProcess):
 
     def __init__(self, node: RobotNode, ends: Ends, *, lock_step: bool = True) -> None:
         super().__init__(ends, [SUPERVISOR], lock_step=lock_step)
-        self._node, self._team = node, ends.clients[SUPERVISOR]
+        self._node, self._team = node, ends.sessions[SUPERVISOR]
         self._placed, self._placing = 0, -inf
         self._stepped: int | None = None
         self._measured, self._stamps = np.zeros(0), (0.0, 0.0)
@@ -524,19 +524,19 @@ class RobotProcess(NodeProcess):
 
     def _hear(self, sender: int, message: Any) -> None:
         if isinstance(message, Switch):
-            self._placed = self._team.sessions
+            self._placed = self._team.count
         self._node.hear([message])
 
     def _begin(self, question: Sample) -> None:
         if question.number == 0:
-            self._placed = self._team.sessions
+            self._placed = self._team.count
         else:
             self._node.forget()
 
     def _say_place(self) -> None:
         """Say which cell this is, where the supervisor may not know, and not a moment ago."""
         now = monotonic()
-        if self._placed == self._team.sessions or now - self._placing < AGAIN:
+        if self._placed == self._team.count or now - self._placing < AGAIN:
             return
         if self._ends.send(SUPERVISOR, self._node.place):
             self._placing = now

@@ -6,8 +6,8 @@ import math
 import secrets
 import time
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass, field
+from collections.abc import Callable, Collection, Iterable, Iterator
+from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
@@ -93,51 +93,53 @@ class Session:
     """One end of a session: numbers of its messages, and what a faulty link does to those that are sent.
 
     Args:
+        put: Hands bytes to the connection; False where it does not take them.
         link: What goes wrong with messages that are sent; None for nothing.
 
     Attributes:
         number: Number of the session.
+        open: Whether both ends have it.
+        count: How many there have been.
         sent: Messages that the receiver takes: neither lost, nor so late that they are refused.
     """
 
-    def __init__(self, link: Link | None = None) -> None:
-        self._link = link
-        self.begin(0)
+    def __init__(self, put: Callable[[bytes], bool], link: Link | None) -> None:
+        self._put, self._link, self.count = put, link, 0
+        self.begin(0, is_open=False)
 
-    def begin(self, number: int) -> None:
-        """Begin a session; what is late in the one before never leaves."""
-        self.number, self.sent = number, 0
+    def begin(self, number: int, *, is_open: bool) -> None:
+        """Begin a session, or ask for one; what is late in the one before never leaves."""
+        self.number, self.open, self.sent = number, is_open, 0
+        self.count += is_open
         self._numbered = self._newest = self._taken = 0
         self._late: list[tuple[int, int, Message, bytes]] = []
 
-    def send(self, message: Message, sample: int, put: Callable[[bytes], bool]) -> bool:
-        """Send a message; False where it is not sent now.
+    def tell(self, message: Message) -> bool:
+        """Send a message about the session itself; False where the connection does not take it."""
+        return self._put(encode(self.number, 0, message))
 
-        Args:
-            message: The message.
-            sample: Number of the present sample.
-            put: Hands bytes to the socket; False where it does not take them.
-        """
-        if isinstance(message, UNNUMBERED):
-            return put(encode(self.number, 0, message))
+    def send(self, message: Message, sample: int) -> bool:
+        """Send a message at a sample; False where it is not sent now, or there is no session."""
+        if not self.open or isinstance(message, UNNUMBERED):
+            return self.open and self.tell(message)
         number = self._numbered + 1
         data = encode(self.number, number, message)
         copies, late = (1, False) if self._link is None else self._link.fate(message, sample)
         if late and copies and self._link is not None:
             self._late.append((sample + self._link.late_by, number, message, data))
             copies = 0
-        elif copies and not put(data):
+        elif copies and not self._put(data):
             return False
         self._numbered = number
         for _ in range(copies - 1):
-            put(data)
+            self._put(data)
         return bool(copies) and self._passed(number)
 
-    def release(self, sample: int, put: Callable[[bytes], bool]) -> list[Any]:
+    def release(self, sample: int) -> list[Any]:
         """Send what is late and due at a sample; return the messages that the receiver takes."""
         due = [kept for kept in self._late if kept[0] <= sample]
         self._late = [kept for kept in self._late if kept[0] > sample]
-        return [message for _, number, message, data in due if put(data) and self._passed(number)]
+        return [message for _, number, message, data in due if self._put(data) and self._passed(number)]
 
     def take(self, number: int) -> None:
         """Take a message by its number.
@@ -225,21 +227,6 @@ class _Socket:
         return True
 
 
-@dataclass
-class Peer:
-    """One process that a server listens to.
-
-    Attributes:
-        key: Its public key, None where there are no keys.
-        session: Its session.
-        route: The connection that has the session; None for no session.
-    """
-
-    key: str | None
-    session: Session = field(default_factory=Session)
-    route: bytes | None = None
-
-
 class Server(_Socket):
     """Listens to the processes that it knows.
 
@@ -256,15 +243,15 @@ class Server(_Socket):
         MessagingError: It cannot listen at its address.
 
     Attributes:
-        peers: What it knows about each process.
+        sessions: Sessions with all processes that it knows, by their indices.
     """
 
     def __init__(self, network: Network, index: int, refusals: Refusals) -> None:
         super().__init__(network.keys, refusals, zmq.ROUTER)
         self._network, self._index, book = network, index, network.book
         clients = [*range(len(book.robots)), *([SUPERVISOR] if index == WORLD else [])]
-        self.peers = {k: Peer(book.key_of(k), Session(network.link(index, k))) for k in clients}
-        self._connected = dict[bytes, int]()
+        self.sessions = {k: Session(partial(self._to, k), network.link(index, k)) for k in clients}
+        self._connected, self._routes = dict[bytes, int](), dict[int, bytes]()
         self._socket.setsockopt(zmq.ROUTER_MANDATORY, 1)
         self._keeper: ThreadAuthenticator | None = None
         if network.keys is not None:
@@ -273,9 +260,8 @@ class Server(_Socket):
             self._socket.zap_domain, self._socket.zap_enforce_domain = b"team", 1
             self._keeper = ThreadAuthenticator(self._context)
             self._keeper.start()
-            self._keeper.configure_curve_callback(
-                "team", credentials_provider=_KnownKeys(self.peers.values())
-            )
+            known = _KnownKeys(map(book.key_of, clients))
+            self._keeper.configure_curve_callback("team", credentials_provider=known)
         address = book.listener(index).address
         try:
             self._socket.bind(address)
@@ -294,19 +280,6 @@ class Server(_Socket):
             except RefusedError as refused:
                 self._refusals.add(refused)
         return None
-
-    def send(self, index: int, message: Message, sample: int = 0) -> bool:
-        """Send a message to a process; False where it has no session, does not take it or will not get it."""
-        peer = self.peers[index]
-        return peer.route is not None and peer.session.send(message, sample, partial(self._to, peer))
-
-    def release(self, sample: int) -> dict[int, list[Any]]:
-        """Send what is late and due at a sample; return the messages that each process takes."""
-        return {k: peer.session.release(sample, partial(self._to, peer)) for k, peer in self.peers.items()}
-
-    def present(self) -> set[int]:
-        """Return the indices of the processes that have a session."""
-        return {index for index, peer in self.peers.items() if peer.route is not None}
 
     def close(self) -> None:
         """See ``_Socket``."""
@@ -327,14 +300,14 @@ class Server(_Socket):
         index = self._connected.get(route)
         if index is None:
             return self._greet(route, data, frames[1])
-        peer = self.peers[index]
-        session, number, message = decode(data, decoder_of(index, self._index))
-        if session != peer.session.number:
+        session = self.sessions[index]
+        own, number, message = decode(data, decoder_of(index, self._index))
+        if own != session.number:
             raise RefusedError(Reason.SESSION)
         if isinstance(message, Hello):  # It has asked again before it has read the answer.
-            self.send(index, Welcome())
+            session.tell(Welcome())
             return None
-        peer.session.take(number)
+        session.take(number)
         return index, message
 
     def _greet(self, route: bytes, data: bytes, frame: zmq.Frame) -> Received:
@@ -346,57 +319,54 @@ class Server(_Socket):
         opening = protocol_of(data)
         if opening is None:
             raise RefusedError(Reason.SESSION)
+        number, protocol = opening
 
-        def refuse(words: str) -> None:
-            self._put((route, encode(opening[0], 0, Refused(words))))
+        def refuse(reason: Reason, words: str) -> RefusedError:
+            self._put((route, encode(number, 0, Refused(words))))
+            return RefusedError(reason)
 
-        if opening[1] != PROTOCOL:
-            refuse(f"it speaks protocol {PROTOCOL}, not {opening[1]}")
-            raise RefusedError(Reason.VERSION)
-        session, _, hello = decode(data)
-        peer = self.peers.get(hello.sender)
-        if peer is None:
-            refuse("it knows no process of this name")
-            raise RefusedError(Reason.SENDER)
-        if self._keeper is not None and frame.get("User-Id") != peer.key:
-            refuse("its address book has another key for this name")
-            raise RefusedError(Reason.SENDER)
-        if words := self._objection(hello, peer):
-            refuse(words)
-            raise RefusedError(Reason.SESSION)
-        self._connected[route], peer.route = hello.sender, route
-        peer.session.begin(session)
-        self.send(hello.sender, Welcome())
-        return hello.sender, hello
+        if protocol != PROTOCOL:
+            raise refuse(Reason.VERSION, f"it speaks protocol {PROTOCOL}, not {protocol}")
+        _, _, hello = decode(data)
+        sender: int = hello.sender
+        if sender not in self.sessions:
+            raise refuse(Reason.SENDER, "it knows no process of this name")
+        if self._keeper is not None and frame.get("User-Id") != self._network.book.key_of(sender):
+            raise refuse(Reason.SENDER, "its address book has another key for this name")
+        for differs, words in (
+            (hello.scenario != self._network.scenario, "it has another scenario"),
+            (hello.plan != self._network.plan, "it has another plan"),
+            (self._is_there(sender), "another process of this name is connected"),
+        ):
+            if differs:
+                raise refuse(Reason.SESSION, words)
+        self._connected[route], self._routes[sender] = sender, route
+        self.sessions[sender].begin(number, is_open=True)
+        self.sessions[sender].tell(Welcome())
+        return sender, hello
 
-    def _objection(self, hello: Hello, peer: Peer) -> str:
-        """Return why a known process gets no session, nothing where it gets one."""
-        if hello.scenario != self._network.scenario:
-            return "it has another scenario"
-        if hello.plan != self._network.plan:
-            return "it has another plan"
-        # A connection is there until the library has noticed that it is not, after two seconds at most.
-        there = self.send(hello.sender, Welcome()) or peer.route is not None
-        return "another process of this name is connected" if there else ""
+    def _is_there(self, index: int) -> bool:
+        """Whether the connection of a process is there; the library notices within two seconds if not."""
+        session = self.sessions[index]
+        return session.open and (session.tell(Welcome()) or session.open)
 
-    def _to(self, peer: Peer, data: bytes) -> bool:
+    def _to(self, index: int, data: bytes) -> bool:
         """Send bytes to a process; False where its connection is full, or gone, and the session with it."""
-        assert peer.route is not None
         try:
-            return self._put((peer.route, data))
+            return self._put((self._routes[index], data))
         except zmq.ZMQError as error:
             if error.errno != zmq.EHOSTUNREACH:
                 raise
-            self._connected.pop(peer.route, None)
-            peer.route = None
+            self._connected.pop(self._routes[index], None)
+            self.sessions[index].open = False
             return False
 
 
 class _KnownKeys:
     """Lets only known keys connect, as ZeroMQ's authentication protocol (ZAP) asks for each connection."""
 
-    def __init__(self, peers: Iterable[Peer]) -> None:
-        self._keys = {peer.key.encode() for peer in peers if peer.key}
+    def __init__(self, keys: Iterable[str | None]) -> None:
+        self._keys = {key.encode() for key in keys if key}
 
     def callback(self, domain: str, key: bytes) -> bool:
         """Whether a client that has proved to have the private key of a public one may connect."""
@@ -415,8 +385,6 @@ class Client(_Socket):
     Attributes:
         address: Where the server listens.
         session: The session.
-        sessions: How many there have been.
-        open: Whether there is one.
         trouble: Why there is none, where there is none.
     """
 
@@ -424,7 +392,7 @@ class Client(_Socket):
         connections = zmq.Event.HANDSHAKE_SUCCEEDED | zmq.Event.DISCONNECTED
         super().__init__(network.keys, refusals, zmq.DEALER, connections)
         self.address, self.trouble = network.book.listener(server).address, "nothing answers there"
-        self.session, self.sessions = Session(network.link(index, server)), 0
+        self.session = Session(lambda data: self._put((data,)), network.link(index, server))
         self._server, self._decoder = server, decoder_of(server, index)
         self._hello = Hello(PROTOCOL, index, network.scenario, network.plan)
         self._restart()
@@ -435,8 +403,8 @@ class Client(_Socket):
 
     def _restart(self) -> None:
         """Ask for another session: the next server may be another process, which does not know this one."""
-        self.open, self._asked = False, -math.inf
-        self.session.begin(secrets.randbits(32))
+        self._asked = -math.inf
+        self.session.begin(secrets.randbits(32), is_open=False)
 
     def poll(self) -> Received | None:
         """Return the server and its message, first the ``Welcome`` of a session; None for nothing."""
@@ -453,23 +421,12 @@ class Client(_Socket):
                 self.trouble = "the connection was refused: a key is missing or wrong"
             elif event == zmq.Event.DISCONNECTED:
                 self._restart()
-            elif not self.open:
+            elif not self.session.open:
                 self._asked = -math.inf
-        if not self.open and time.monotonic() - self._asked >= _AGAIN:
+        if not self.session.open and time.monotonic() - self._asked >= _AGAIN:
             self._asked = time.monotonic()
-            self.session.send(self._hello, 0, self._to)
+            self.session.tell(self._hello)
         return None
-
-    def send(self, message: Message, sample: int = 0) -> bool:
-        """Send a message; False where there is no session, the server does not take it or will not get it."""
-        return self.open and self.session.send(message, sample, self._to)
-
-    def release(self, sample: int) -> None:
-        """Send what is late and due at a sample."""
-        self.session.release(sample, self._to)
-
-    def _to(self, data: bytes) -> bool:
-        return self._put((data,))
 
     def _take(self, frames: list[zmq.Frame]) -> Any | None:
         """Return a message; None where it says nothing new about the session.
@@ -479,18 +436,19 @@ class Client(_Socket):
         """
         if len(frames) != 1:
             raise RefusedError(Reason.MALFORMED, "Expected one frame, got several")
-        session, number, message = decode(frames[0].bytes, self._decoder)
-        if session != self.session.number or not (self.open or isinstance(message, Welcome | Refused)):
+        own, number, message = decode(frames[0].bytes, self._decoder)
+        session, opens = self.session, isinstance(message, Welcome | Refused)
+        if own != session.number or not (session.open or opens):
             raise RefusedError(Reason.SESSION)
-        if isinstance(message, Refused) and not self.open:
+        if isinstance(message, Refused):
             self.trouble = message.reason
-        if isinstance(message, Welcome) and not self.open:
-            self.open, self.sessions = True, self.sessions + 1
+        if isinstance(message, Welcome) and not session.open:
+            session.begin(own, is_open=True)
             return message
-        if isinstance(message, Welcome | Refused):
+        if opens:
             return None
         if not isinstance(message, UNNUMBERED):
-            self.session.take(number)
+            session.take(number)
         return message
 
 
@@ -503,18 +461,19 @@ class Ends:
 
     Attributes:
         sample: Number of the present sample, on which faults of messages depend.
-        server: The end at which it listens; None for a robot.
+        sessions: Sessions with all processes with which this one speaks, by their indices.
         clients: The ends that connect to others, by their indices.
         refusals: What was refused.
     """
 
     def __init__(self, network: Network, index: int) -> None:
-        self.sample, self._arrived, refusals = 0, deque[Received](), Refusals(name_of(index))
-        self.clients = {k: Client(network, index, k, refusals) for k in (WORLD, SUPERVISOR) if k > index}
-        self.server = Server(network, index, refusals) if index in (WORLD, SUPERVISOR) else None
-        self.refusals = refusals
-        self._awaits_all = index == WORLD
-        self._all: list[Server | Client] = [*self.clients.values(), *([self.server] if self.server else [])]
+        self.sample, self._arrived, self.refusals = 0, deque[Received](), Refusals(name_of(index))
+        self.clients = {k: Client(network, index, k, self.refusals) for k in (WORLD, SUPERVISOR) if k > index}
+        self.sessions = {k: client.session for k, client in self.clients.items()}
+        self._all: list[Server | Client] = [*self.clients.values()]
+        if index in (WORLD, SUPERVISOR):
+            self._all.append(server := Server(network, index, self.refusals))
+            self.sessions |= server.sessions
         self._poller, self._owners = zmq.Poller(), dict[Any, Server | Client]()
         for end in self._all:
             for socket in end.sockets:
@@ -523,17 +482,12 @@ class Ends:
 
     def send(self, index: int, message: Message) -> bool:
         """Send a message to a process; False where it has no session, does not take it or will not get it."""
-        if index in self.clients:
-            return self.clients[index].send(message, self.sample)
-        return self.server is not None and self.server.send(index, message, self.sample)
+        return self.sessions[index].send(message, self.sample)
 
     def sent(self, index: int) -> int:
         """Return how many messages a process takes in its session, 0 without one."""
-        if index in self.clients:
-            client = self.clients[index]
-            return client.session.sent if client.open else 0
-        peer = self.server.peers[index] if self.server else Peer(None)
-        return peer.session.sent if peer.route is not None else 0
+        session = self.sessions[index]
+        return session.sent if session.open else 0
 
     def receive(self, limit: float = 0.0) -> Received | None:
         """Return the index of a sender and its message, None where nothing is there in time.
@@ -553,19 +507,20 @@ class Ends:
 
     def present(self) -> set[int]:
         """Return the indices of the processes with which there are sessions."""
-        asked = {index for index, client in self.clients.items() if client.open}
-        return asked | (self.server.present() if self.server else set())
+        return {index for index, session in self.sessions.items() if session.open}
 
     def release(self) -> dict[int, list[Any]]:
-        """Send what is late and due, after what is new; return what each process takes of the server's."""
-        for client in self.clients.values():
-            client.release(self.sample)
-        return self.server.release(self.sample) if self.server else {}
+        """Send what is late and due, after what is new; return what each process takes of it."""
+        return {index: session.release(self.sample) for index, session in self.sessions.items()}
 
-    def open(self, limit: float) -> None:
+    def open(self, limit: float, ended: Callable[[], Collection[int]] = tuple) -> None:
         """Wait for sessions with all servers, or where this is the world with all others.
 
         Messages that arrive meanwhile are kept for :meth:`receive`.
+
+        Args:
+            limit: Longest time to wait [s].
+            ended: Returns the processes that are known to have ended, which are not waited for.
 
         Raises:
             MessagingError: There are none in time; it says who does not answer, where and why.
@@ -573,9 +528,12 @@ class Ends:
         deadline = time.monotonic() + limit
         while words := self._missing():
             left = deadline - time.monotonic()
-            self._poll(left)
-            if left <= 0.0 and self._missing():
+            if gone := ended():
+                names = ", ".join(name_of(index) for index in sorted(gone))
+                raise MessagingError(f"the process of {names} ended before the start")
+            if left <= 0.0:
                 raise MessagingError(f"{words} (waited for {limit:g} s)")
+            self._poll(min(left, _AGAIN))
 
     def close(self) -> None:
         """Close all sockets."""
@@ -583,16 +541,16 @@ class Ends:
             end.close()
 
     def _missing(self) -> str:
-        """Say with whom there are no sessions yet."""
-        if self.server is not None and self._awaits_all:
-            missing = sorted(self.server.peers.keys() - self.present())
-            return "no message came from " + ", ".join(map(name_of, missing)) if missing else ""
-        asking = [(name_of(k), client) for k, client in self.clients.items() if not client.open]
-        return "; ".join(f"{name} at {client.address}: {client.trouble}" for name, client in asking)
+        """Say with whom there are no sessions yet: servers, or where this is the world all others."""
+        missing = [(name_of(k), k) for k in sorted((self.clients or self.sessions).keys() - self.present())]
+        if not self.clients:
+            return "no message came from " + ", ".join(name for name, _ in missing) if missing else ""
+        known = self.clients
+        return "; ".join(f"{name} at {known[k].address}: {known[k].trouble}" for name, k in missing)
 
     def _poll(self, seconds: float) -> None:
         """Wait until something comes, then take one message of every end, so that none waits for another."""
-        asking = [client for client in self.clients.values() if not client.open]
+        asking = [client for client in self.clients.values() if not client.session.open]
         limit = min(max(seconds, 0.0), _AGAIN if asking else math.inf)
         ready = [self._owners[socket] for socket, _ in self._poller.poll(math.ceil(1e3 * limit))]
         for end in dict.fromkeys((*ready, *asking)):

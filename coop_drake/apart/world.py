@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import time as clocks
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Callable, Sequence
 from math import inf
 from typing import Any
 
@@ -41,29 +40,6 @@ _REHEARSALS = 20
 answers of a process take several times as long as the later ones."""
 
 
-@dataclass(frozen=True)
-class Ages:
-    """Ages of what commands were computed from, when they came back to the world [s].
-
-    Attributes:
-        count: Number of commands.
-        median: Half of them are younger.
-        high: 99.9 % of them are younger.
-        largest: The oldest.
-        late: How many were older than is allowed.
-        allowed: Largest age that is allowed.
-        slipped: By how much the run took longer than its simulated time.
-    """
-
-    count: int
-    median: float
-    high: float
-    largest: float
-    late: int
-    allowed: float
-    slipped: float
-
-
 class Pacing:
     """Lets samples begin no earlier than by the wall clock, and collects ages.
 
@@ -95,99 +71,22 @@ class Pacing:
         """Note the age of a command [s]."""
         self._ages.append(age)
 
-    def ages(self) -> Ages:
-        """Return what was measured."""
+    def facts(self) -> dict[str, float]:
+        """Return what was measured [s]: ages of what commands were computed from, when they came back.
+
+        ``high`` is that below which 99.9 % of them are, ``late`` how many of all ``count`` were older than
+        ``allowed``, ``slipped`` by how much the run took longer than its simulated time.
+        """
         ages = np.array(self._ages or [0.0])
-        return Ages(
-            len(self._ages),
-            float(np.median(ages)),
-            float(np.quantile(ages, 0.999)),
-            float(ages.max()),
-            int((ages > self.allowed).sum()),
-            self.allowed,
-            self._slipped,
-        )
-
-
-def question(
-    index: int,
-    sample: int,
-    time: float,
-    measured: Sequence[FloatArray],
-    counts: Mapping[int, Any],
-    stamps: Sequence[FloatArray],
-    *,
-    step: bool,
-    stopped: bool,
-) -> Sample | Tick:
-    """Return what a process is asked at an instant.
-
-    Args:
-        index: Its index in messages.
-        sample: Number of the sample.
-        time: What its clock shows [s].
-        measured: What every robot measures: its own state, then the object's pose.
-        counts: How many messages each process has sent to the team, or the supervisor to each robot.
-        stamps: When every robot's pose and state were measured [s].
-        step: Whether it updates its state.
-        stopped: Whether the drives brake.
-    """
-    if index == SUPERVISOR:
-        sent = tuple(counts.get(k, 0) for k in range(len(measured)))
-        return Tick(sample, time, step, stopped, sent)
-    told, own = counts.get(SUPERVISOR), measured[index]
-    heard, (placed, moved) = told[index] if told else 0, stamps[index].tolist()
-    pose, state = tuple(own[-3:].tolist()), tuple(own[:-3].tolist())
-    return Sample(sample, time, step, stopped, heard, placed, moved, pose, state)
-
-
-def fits(sender: int, message: Any, sizes: Sequence[int], known: Mapping[tuple[int, type], Any]) -> bool:
-    """Whether the lists of an answer are as long as they must be, and its state is one.
-
-    Args:
-        sender: Who answers.
-        message: An ``Effort``, ``Telemetry`` or ``Status``.
-        sizes: Number of efforts of every robot.
-        known: The last answers.
-    """
-    if isinstance(message, Status):
-        return len(message.team_messages) == len(sizes) and len(message.causes) in (0, 1 + len(sizes))
-    if isinstance(message, Effort):
-        size = sizes[sender]
-        fitting = len(message.efforts) == size and len(message.rest) in (0, size)
-        return fitting and bool(message.state < len(STATES))
-    before = known.get((sender, Telemetry))
-    return (before is None or len(before.values) == len(message.values)) and bool(message.state < len(STATES))
-
-
-def process_facts(
-    index: int,
-    shown: Telemetry | Status | None,
-    *,
-    missing_since: float | None,
-    ended: bool,
-    state: int,
-    age: float | None,
-) -> dict[str, Any]:
-    """Return what a run reports about a process.
-
-    Args:
-        index: Its index in messages.
-        shown: What it has shown last.
-        missing_since: Since which simulated time it is missing [s].
-        ended: Whether a process that is missing is known to have ended.
-        state: The last state of a robot.
-        age: Age of what its last command was computed from, when it came to the world [s].
-    """
-    there, missing = "there" if index == SUPERVISOR else STATES[state], "gone" if ended else "silent"
-    return {
-        "name": name_of(index),
-        "state": there if missing_since is None else missing,
-        "missing_since": missing_since,
-        "team_messages": 0 if shown is None else int(np.sum(shown.team_messages)),
-        "refused": 0 if shown is None else shown.refused,
-        "age": age,
-    }
+        return {
+            "count": len(self._ages),
+            "median": float(np.median(ages)),
+            "high": float(np.quantile(ages, 0.999)),
+            "largest": float(ages.max()),
+            "late": int((ages > self.allowed).sum()),
+            "allowed": self.allowed,
+            "slipped": self._slipped,
+        }
 
 
 class SampleExchange:
@@ -221,6 +120,7 @@ class SampleExchange:
     Attributes:
         sample: Number of the present sample.
         membership: Who is missing, and whether the drives brake.
+        missing: Since which simulated time each missing process is missing [s].
         brakes: How the drives of each robot brake.
     """
 
@@ -244,7 +144,7 @@ class SampleExchange:
         self.membership = Membership(
             tolerated=tolerated, rejoin=rejoin, processes=processes or Processes(), tell=tell
         )
-        self.brakes: Sequence[Brake] = ()
+        self.missing, self.brakes = self.membership.missing, list[Brake]()
         self.sample, self._still = 0, Stillness(network.period)
         self._last: dict[tuple[int, type], Any] = {}
         self._states = dict[int, int]()
@@ -254,11 +154,6 @@ class SampleExchange:
         self._stamps: Sequence[FloatArray] = ()
         self._answered, self._ages = dict[int, float](), dict[int, float]()
         self._sampled, self._expected, self._unheard = -1, dict[int, tuple[int, float]](), set[int]()
-
-    @property
-    def missing(self) -> dict[int, float]:
-        """Since which simulated time each missing process is missing [s]."""
-        return self.membership.missing
 
     def trouble(self) -> str:
         """See ``Exchange``."""
@@ -270,20 +165,25 @@ class SampleExchange:
 
     def facts(self) -> dict[str, Any]:
         """Return what a run reports about its processes: answers, messages of the team, ages of commands."""
-        processes = [
-            process_facts(
-                index,
-                self._last.get((index, Status if index == SUPERVISOR else Telemetry)),
-                missing_since=self.missing.get(index),
-                ended=self.membership.ended(index),
-                state=self._states.get(index, FOLLOWS),
-                age=self._ages.get(index),
-            )
-            for index in self._everyone
-        ]
-        ages = {} if self._pacing is None else {"command_ages": asdict(self._pacing.ages())}
+        ages = {} if self._pacing is None else {"command_ages": self._pacing.facts()}
         refused = {why.name: n for why, n in self._ends.refusals.counts.items()}
+        processes = [self._process_facts(index) for index in self._everyone]
         return {"processes": processes, "refused": refused, **self.membership.facts(), **ages}
+
+    def _process_facts(self, index: int) -> dict[str, Any]:
+        """Return what a run reports about one process."""
+        shown = self._last.get((index, Status if index == SUPERVISOR else Telemetry))
+        state, since = STATES[self._states.get(index, FOLLOWS)], self.missing.get(index)
+        there = "there" if index == SUPERVISOR else state
+        missing = "gone" if self.membership.ended(index) else "silent"
+        return {
+            "name": name_of(index),
+            "state": there if since is None else missing,
+            "missing_since": since,
+            "team_messages": 0 if shown is None else int(np.sum(shown.team_messages)),
+            "refused": 0 if shown is None else shown.refused,
+            "age": self._ages.get(index),
+        }
 
     def step(
         self, time: float, measured: Sequence[FloatArray], stamps: Sequence[FloatArray] | None = None
@@ -367,11 +267,7 @@ class SampleExchange:
         self._sizes = [(len(own) - 3) // 2 for own in measured]  # As many efforts as own coordinates.
         self._asked[self.sample] = clocks.monotonic(), time
         self._ends.sample = self.sample
-        flags = {"step": step, "stopped": self.membership.stopped}
-        asking = {
-            k: question(k, self.sample, self._clock(k, time), measured, self._counts, self._stamps, **flags)
-            for k in asked
-        }
+        asking = {k: self._question(k, time, measured, step=step) for k in asked}
         self._expected = {k: (q.number, q.time) for k, q in asking.items() if self._ends.send(k, q)}
         for index, late_ones in self._ends.release().items():
             if late_ones:
@@ -396,6 +292,31 @@ class SampleExchange:
                 self._unheard |= (quiet := self._quiet({*asked} - late, time))  # Who is there, but not heard.
                 self._lose(quiet)
         return late
+
+    def _question(
+        self, index: int, time: float, measured: Sequence[FloatArray], *, step: bool
+    ) -> Sample | Tick:
+        """Return what a process is asked at an instant."""
+        head = self.sample, self._clock(index, time), step, self.membership.stopped
+        if index == SUPERVISOR:
+            return Tick(*head, tuple(self._counts.get(k, 0) for k in self._everyone[:-1]))
+        told, own = self._counts.get(SUPERVISOR), measured[index]
+        heard, (placed, moved) = told[index] if told else 0, self._stamps[index].tolist()
+        pose, state = tuple(own[-3:].tolist()), tuple(own[:-3].tolist())
+        return Sample(*head, heard, placed, moved, pose, state)
+
+    def _fits(self, sender: int, message: Effort | Telemetry | Status) -> bool:
+        """Whether the lists of an answer are as long as they must be, and its state is one."""
+        if isinstance(message, Status):
+            robots = len(self._sizes)
+            return len(message.team_messages) == robots and len(message.causes) in (0, 1 + robots)
+        if isinstance(message, Effort):
+            size = self._sizes[sender]
+            fitting = len(message.efforts) == size and len(message.rest) in (0, size)
+        else:
+            before = self._last.get((sender, Telemetry))
+            fitting = before is None or len(before.values) == len(message.values)
+        return fitting and message.state < len(STATES)
 
     def _quiet(self, indices: set[int], time: float) -> set[int]:
         """Return those that are not missing yet, and whose last efforts were held for too long."""
@@ -434,7 +355,7 @@ class SampleExchange:
         was_missing, unheard = sender in self.missing, sender in self._unheard
         if not isinstance(message, Effort | Telemetry | Status) or (was_missing and not (admits or unheard)):
             return nothing
-        if message.number > self.sample or not fits(sender, message, self._sizes, self._last):
+        if message.number > self.sample or not self._fits(sender, message):
             self._ends.refusals.add(RefusedError(Reason.VALUE))
             return nothing
         asked, time = self._asked[message.number]

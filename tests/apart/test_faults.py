@@ -14,16 +14,17 @@ PERIOD = 0.01
 
 def sending(faults, messages, sender=0, receiver=SUPERVISOR):
     """Numbers of the messages that leave at each sample, one message being sent at each."""
-    session = Session(Network(local_book(2), faults=faults, period=PERIOD).link(sender, receiver))
     left, now = [], []
 
     def put(data):
         now.append(msgspec.msgpack.decode(data)[1])
         return True
 
+    session = Session(put, Network(local_book(2), faults=faults, period=PERIOD).link(sender, receiver))
+    session.begin(1, is_open=True)
     for sample, message in enumerate(messages):
-        session.send(message, sample, put)
-        session.release(sample, put)
+        session.send(message, sample)
+        session.release(sample)
         left.append(tuple(now))
         now.clear()
     return left, session.sent

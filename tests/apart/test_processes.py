@@ -292,22 +292,6 @@ def test_a_team_without_one_process_rests_without_contact(name, act, missing):
 
 
 @pytest.mark.slow
-def test_a_process_that_goes_on_in_time_changes_nothing():
-    log, facts, _ = run(sampled("base"), {FAULT: signalled(1, signal.SIGSTOP, signal.SIGCONT)})
-    assert log.reached
-    assert facts["stops"] == []
-
-
-@pytest.mark.slow
-def test_a_robot_that_is_late_for_too_long_stops_a_paced_team():
-    acts = {FAULT: signalled(1, signal.SIGSTOP)}
-    log, facts, _ = run(sampled("base"), acts, pacing=Pacing(allowed=1.0), rejoin=0.0)
-    assert log.violation.startswith("robot 1 has not answered since t = 0.39 s; the team rests")
-    assert facts["processes"][1]["state"] == "silent"
-    assert facts["processes"][1]["missing_since"] == pytest.approx(0.39)
-
-
-@pytest.mark.slow
 def test_a_robot_that_is_killed_and_started_again_rejoins_and_the_team_arrives():
     problem = sampled("base")
     log, facts, told = run(problem, {FAULT: kill(1)})
