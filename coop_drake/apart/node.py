@@ -63,6 +63,9 @@ it by then. While one has not, the drives brake on, and the order is given again
 TURN = 0.2
 """How often a process without news sees whether it is still wanted [s]."""
 
+_SILENCE = 30.0
+"""Longest time without a message before a process ends [s]."""
+
 MOST_WAITING = 4096
 """Messages of one sender that wait at most for the samples for which they count: a few come in each."""
 
@@ -179,9 +182,9 @@ class Mail:
         """Whether so many messages of the session have come."""
         return self._used + len(self._waiting) >= count
 
-    def take(self, count: int | None) -> list[Any]:
-        """Return those of the first ``count`` messages of the session that are new; None for all new ones."""
-        number = len(self._waiting) if count is None else max(count - self._used, 0)
+    def take(self, count: int) -> list[Any]:
+        """Return those of the first ``count`` messages of the session that are new."""
+        number = max(count - self._used, 0)
         self._used += number
         return [self._waiting.popleft() for _ in range(number)]
 
@@ -189,27 +192,24 @@ class Mail:
 class NodeProcess(ABC):
     """A robot or the supervisor as a process: answers the world until it says goodbye.
 
-    In lock-step a message of the team counts from the instant after the sample in which it was sent, also
-    where it comes earlier: an answer uses as many messages as its question says. Otherwise everything counts
-    that has come.
+    A message of the team counts from the instant after the sample in which it was sent, also where it comes
+    earlier: an answer uses as many messages as its question says.
 
     Args:
         ends: The sockets, with sessions.
         team: Indices of those whose messages are heard.
-        lock_step: Whether questions say how many messages count.
     """
 
-    def __init__(self, ends: Ends, team: Iterable[int], *, lock_step: bool) -> None:
-        self._ends, self._lock_step = ends, lock_step
-        self._mail = {index: Mail() for index in team}
-        self._questions, self._begun = deque[Any](), False
+    def __init__(self, ends: Ends, team: Iterable[int]) -> None:
+        self._ends, self._mail = ends, {index: Mail() for index in team}
+        self._question: Any = None
+        self._begun = False
 
-    def run(self, wanted: Callable[[], bool], silence: float = 30.0) -> int:
+    def run(self, wanted: Callable[[], bool]) -> int:
         """Answer until the world says goodbye; return the outcome that it names.
 
         Args:
             wanted: Says whether the process shall go on; asked while nothing comes.
-            silence: Longest time without a message of the world [s].
 
         Raises:
             MessagingError: The world was silent for too long, or the process is not wanted any more.
@@ -219,35 +219,32 @@ class NodeProcess(ABC):
         while True:
             taken = self._ends.receive(TURN)
             waited = 0.0 if taken is not None else waited + TURN
-            if taken is None and (waited > silence or not wanted()):
+            if taken is None and (waited > _SILENCE or not wanted()):
                 raise MessagingError(f"the world has said nothing for {waited:.1f} s")
             # Everything that is there first, but of a flood a part: it may count for the next answer.
-            for _ in range(MOST_WAITING):
-                if taken is None:
-                    break
+            arrived = 0
+            while taken is not None:
                 sender, message = taken
                 if isinstance(message, Goodbye):
                     return message.outcome
                 if isinstance(message, Sample | Tick):
-                    self._queue(message)
+                    self._ask(message)
                 elif sender != WORLD:
                     self._receive(sender, message)
-                taken = self._ends.receive()
-            while self._questions and self._answered(self._questions[0]):
-                self._questions.popleft()
+                arrived += 1
+                taken = self._ends.receive() if arrived < MOST_WAITING else None
+            if self._question is not None and self._answered(self._question):
+                self._question = None
 
-    def _queue(self, question: Sample | Tick) -> None:
-        """Add a question.
-
-        In lock-step it replaces those that the world does not wait for any more. Otherwise all steps that are
-        late are made up for, but for those before the drives brake.
-        """
+    def _ask(self, question: Sample | Tick) -> None:
+        """Take in a question, which replaces one for whose answer the world does not wait any more."""
+        if words := self._objection(question):
+            self._ends.refusals.add(RefusedError(Reason.VALUE, f"{words}, in {type(question).__name__}"))
+            return
         if not self._begun:
             self._begun = True
             self._begin(question)
-        replaced = self._lock_step or question.stopped
-        kept = () if replaced else (asked for asked in self._questions if asked.step)
-        self._questions = deque((*kept, question))
+        self._question = question
 
     def _receive(self, sender: int, message: Any) -> None:
         if isinstance(message, Hello | Welcome):
@@ -257,14 +254,18 @@ class NodeProcess(ABC):
 
     def _answered(self, question: Any) -> bool:
         """Answer a question, unless messages that count for it have not come yet."""
-        counts = self._counts(question) if self._lock_step else {}
+        counts = self._counts(question)
         if not all(self._mail[index].has(count) for index, count in counts.items()):
             return False
-        for index, mail in self._mail.items():
-            for message in mail.take(counts.get(index)):
+        for index, count in counts.items():
+            for message in self._mail[index].take(count):
                 self._hear(index, message)
         self._answer(question)
         return True
+
+    @abstractmethod
+    def _objection(self, question: Any) -> str:
+        """Say why a question does not fit this process; nothing where it does."""
 
     @abstractmethod
     def _begin(self, question: Any) -> None:

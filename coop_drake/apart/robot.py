@@ -36,6 +36,7 @@ from coop_drake.apart.node import (
     LASTING,
     LATE,
     LOSSY_REPORT_TIMEOUT,
+    MOST_WAITING,
     MOVES,
     OUTSIDE,
     REPORT_TIMEOUT,
@@ -179,6 +180,7 @@ class RobotNode:
 
     Attributes:
         period: Control period [s].
+        state_size: Number of values of the robot's own state.
         place: The current cell as the robot knows it.
         state: Its state, see ``messages.Effort``.
         rest: Where its drives bring it if they brake now, z_k; None where it follows no nominal motion.
@@ -191,7 +193,7 @@ class RobotNode:
         self.period, self._held = knowledge.period or 0.0, knowledge.hold is not None
         self._monitored = knowledge.monitored is not None
         self._joints = knowledge.joints.stop - knowledge.joints.start
-        self._state_size = 2 * (3 + self._joints)
+        self.state_size = 2 * (3 + self._joints)
         self._axes = np.array([0, *range(1 + knowledge.joints.start, 1 + knowledge.joints.stop)])
         self._tables = [law.table for law in axis_laws(knowledge.plan, self._axes.tolist())]
         self._knowledge, self._plan, self._chain = knowledge, knowledge.plan, robot_chain(knowledge.robot)
@@ -209,16 +211,16 @@ class RobotNode:
         self._timeout = self._samples_of(REPORT_TIMEOUT)
         self._number = 0
         endless = [3 + i for i, joint in enumerate(knowledge.robot.joints) if is_circle(joint)]
-        self._circles = [self._state_size + 2, *endless]
+        self._circles = [self.state_size + 2, *endless]
         ends = [(cell.lower[self._axes], cell.upper[self._axes]) for cell in knowledge.plan.cells]
         self._turns = [(self._of_circles(lower), self._of_circles(upper)) for lower, upper in ends]
         self._near = self._of_circles(knowledge.plan.start[2:][self._axes])
         start = np.array(knowledge.plan.start[:3])
-        self._sampled.at(0.0, self._inputs(np.concatenate([np.zeros(self._state_size), start])))
+        self._sampled.at(0.0, self._inputs(np.concatenate([np.zeros(self.state_size), start])))
         self._deployed.prepare(self._sampled.context, start[:2])
 
     def _inputs(self, measured: FloatArray) -> dict[str, FloatArray]:
-        own = {"robot_state": measured[: self._state_size], "object_pose": measured[self._state_size :]}
+        own = {"robot_state": measured[: self.state_size], "object_pose": measured[self.state_size :]}
         heard = {"current_cell": self._cell}
         return own | heard | ({"hold_message": self._hold_message} if self._held else {})
 
@@ -308,7 +310,8 @@ class RobotNode:
             if isinstance(message, Switch):
                 if self.place.known and message.cell > self.place.cell and self._number - message.sample > 1:
                     self._timeout = self._samples_of(LOSSY_REPORT_TIMEOUT)
-                if not self.place.known or message.sample > self.place.sample:
+                new = not self.place.known or message.sample > self.place.sample
+                if new and message.cell < len(self._tables):
                     self._enter(message.cell, message.sample)
             elif isinstance(message, Hold):
                 self._hold_message = np.array([message.held, message.number], dtype=float)
@@ -388,8 +391,8 @@ class RobotNode:
         if self.state not in (STANDS, OUTSIDE):
             self._still.restart()
         self.state, self._slow = STANDS, None
-        rates, joints = measured[3 + self._joints : self._state_size], measured[3 : 3 + self._joints]
-        seen = np.concatenate([joints, measured[self._state_size :]])
+        rates, joints = measured[3 + self._joints : self.state_size], measured[3 : 3 + self._joints]
+        seen = np.concatenate([joints, measured[self.state_size :]])
         if not self._still.sees_rest(rates, seen):
             return []
         mean, table = self._still.mean(), self._tables[self.place.cell]
@@ -462,7 +465,7 @@ class RobotNode:
         axes[0] = np.clip(axes[0], lower + inner, upper - inner)
         away = self._inside(cell, position, ROOM)
         position = away if np.hypot(*(away - position)) <= 3.0 * ROOM else position
-        state = np.zeros(self._state_size)
+        state = np.zeros(self.state_size)
         place_on_axes(axes, self._knowledge.axis_motion.mounting, state)
         half, (c, s) = 3 + self._joints, (np.cos(axes[0, 0]), np.sin(axes[0, 0]))
         motion = motion_room(self._chain)
@@ -509,15 +512,20 @@ class RobotProcess(NodeProcess):
     Args:
         node: The robot.
         ends: Its sockets, with sessions.
-        lock_step: Whether samples say how many messages of the supervisor count.
     """
 
-    def __init__(self, node: RobotNode, ends: Ends, *, lock_step: bool = True) -> None:
-        super().__init__(ends, [SUPERVISOR], lock_step=lock_step)
+    def __init__(self, node: RobotNode, ends: Ends) -> None:
+        super().__init__(ends, [SUPERVISOR])
         self._node, self._team = node, ends.sessions[SUPERVISOR]
         self._placed, self._placing = 0, -inf
         self._stepped: int | None = None
         self._measured, self._stamps = np.zeros(0), (0.0, 0.0)
+
+    def _objection(self, question: Sample) -> str:
+        if len(question.object_pose) != 3 or len(question.robot_state) != self._node.state_size:
+            return f"Expected 3 numbers of the object and {self._node.state_size} of the robot"
+        missed = 0 if self._stepped is None else question.number - self._stepped
+        return "" if missed <= MOST_WAITING else f"Expected a number up to {MOST_WAITING} after the last"
 
     def _counts(self, question: Sample) -> Mapping[int, int]:
         return {SUPERVISOR: question.team_messages}

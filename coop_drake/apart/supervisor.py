@@ -194,12 +194,15 @@ class SupervisorProcess(NodeProcess):
         node: The supervisor.
         ends: Its sockets, with sessions.
         robots: Number of robots.
-        lock_step: Whether ticks say how many messages of each robot count.
     """
 
-    def __init__(self, node: SupervisorNode, ends: Ends, robots: int, *, lock_step: bool = True) -> None:
-        super().__init__(ends, range(robots), lock_step=lock_step)
+    def __init__(self, node: SupervisorNode, ends: Ends, robots: int) -> None:
+        super().__init__(ends, range(robots))
         self._node, self._robots = node, range(robots)
+
+    def _objection(self, question: Tick) -> str:
+        robots = len(self._robots)
+        return "" if len(question.team_messages) == robots else f"Expected {robots} numbers of messages"
 
     def _counts(self, question: Tick) -> Mapping[int, int]:
         return dict(enumerate(question.team_messages))

@@ -175,7 +175,7 @@ class _Socket:
         self._socket: zmq.Socket[bytes] = self._context.socket(kind)
         self._socket.set_hwm(_HIGH_WATER)
         for option, value in (
-            (zmq.LINGER, 200),
+            (zmq.LINGER, 2000),
             (zmq.MAXMSGSIZE, LONGEST),
             (zmq.HEARTBEAT_IVL, _ALIVE),
             (zmq.HEARTBEAT_TIMEOUT, _DEAD),
@@ -195,7 +195,7 @@ class _Socket:
         return self._socket, self._monitor
 
     def close(self) -> None:
-        """Close everything; what was sent may leave for a fifth of a second."""
+        """Close everything; what was sent may leave for two seconds."""
         if not self._socket.closed:
             self._socket.disable_monitor()
             self._monitor.close()

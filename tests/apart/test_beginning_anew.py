@@ -173,7 +173,8 @@ def test_a_supervisor_that_was_started_again_learns_the_latest_cell_from_all_rob
 def test_what_does_not_fit_is_left_aside(supervisor, robots):
     supervisor.hear(0, [Place(True, 9, 0), AtRest(5, (), 1, (1.0,))])
     assert supervisor.answers() == []
-    robots[0].hear([Begin(9, 12, 40, (0.0, 0.0, 0.0)), Begin(0, 12, 40, (0.0,))])
+    robots[0].hear([Begin(9, 12, 40, (0.0, 0.0, 0.0)), Begin(0, 12, 40, (0.0,)), Switch(9, 12)])
+    assert robots[0].place == Place(True, 0, 0)
     stand(robots[0], at_start(), 20)
     assert robots[0].state == STANDS
 

@@ -112,7 +112,7 @@ class OutsideWorld:
 
     def __init__(self, address, robots):
         self._socket = zmq.Context.instance().socket(zmq.ROUTER)
-        self._socket.linger = 200
+        self._socket.linger = 10_000
         self._socket.bind(address)
         self._robots, self._routes, self._numbers = robots, {}, {}
         self._counts, self._sample, self._efforts = {}, 0, {}
@@ -146,7 +146,11 @@ class OutsideWorld:
                 fields |= {"type": "Sample", "team_messages": self._counts.get(SUPERVISOR, {}).get(k, 0)}
                 fields |= {"pose_stamp": pose, "state_stamp": state}
                 fields |= {"object_pose": own[-3:], "robot_state": own[:-3]}
-            self._numbers[k] += 1
+            unfitting = [fields | {"time": "now"}, fields | {"team_messages": [0] * 7}, {"type": "Stop"}]
+            unfitting += [fields | {"number": 9999}] if k != SUPERVISOR and self._sample == 1 else []
+            for wrong in unfitting if self._sample in (0, 1) and step else []:
+                self._send(k, wrong, self._numbers[k] + 1)
+            self._numbers[k] += 2
             self._send(k, fields, self._numbers[k])
         shown = {}
         while len(shown) <= self._robots:
@@ -158,6 +162,7 @@ class OutsideWorld:
         counts = {k: fields["team_messages"] for k, fields in shown.items()}
         self._counts = counts | {SUPERVISOR: dict(enumerate(counts[SUPERVISOR]))}
         status = shown.pop(SUPERVISOR)
+        self.refused = [status["refused"], *(fields["refused"] for fields in shown.values())]
         ends = [status["cell"], status["entry"], status["arrived"], *status["causes"]]
         return np.concatenate([*(shown[k]["values"] for k in range(self._robots)), ends])
 
@@ -185,7 +190,7 @@ class OutsideWorld:
 
 
 @pytest.mark.slow
-def test_a_world_that_is_built_by_the_page_of_messages_runs_the_team_as_ours_does():
+def test_a_world_that_is_built_by_the_page_of_messages_runs_the_team_as_ours_does(capfd):
     problem = sampled("base")
     network = network_of(*problem)
     with LocalTeam(*problem, small_maps(), network) as team:
@@ -199,6 +204,8 @@ def test_a_world_that_is_built_by_the_page_of_messages_runs_the_team_as_ours_doe
         for process in team.processes.values():
             process.join(5.0)
         assert [process.exitcode for process in team.processes.values()] == [0, 0, 0]
+    assert outside.refused == [6, 7, 7]
+    assert capfd.readouterr().err.count("robot 0 refused a message, and goes on: Expected") == 2
     assert log.reached
     assert differences(log, simulate(*problem, small_maps())) == []
 
