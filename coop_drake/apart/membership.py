@@ -78,6 +78,7 @@ class Membership:
         stopped: Whether the line is open.
         stops: All times in which it was.
         trouble: Why the run cannot go on; empty where it can.
+        gone: Returns the processes that are known to have ended.
     """
 
     def __init__(
@@ -91,13 +92,9 @@ class Membership:
         self.missing, self.stops, self.stopped = dict[int, float](), list[Stop](), False
         self.trouble, self.revived = "", list[int]()
         self.tolerated = tolerated
-        self._rejoin, self._processes, self._tell = rejoin, processes, tell
+        self.gone, self._revive, self._rejoin, self._tell = processes.gone, processes.revive, rejoin, tell
         self._deadline: float | None = None
         self._rests: float | None = None
-
-    def ended(self, index: int) -> bool:
-        """Whether a process is known to have ended."""
-        return index in self._processes.gone()
 
     def too_long(self, since: float, time: float) -> bool:
         """Whether an effort was held from one time to another for longer than is tolerated [s]."""
@@ -107,7 +104,7 @@ class Membership:
         """Go on without processes from the last instants that they have answered [s]."""
         for index, time in since.items():
             self.missing[index] = time
-            revived = self.ended(index) and self._revived(index)
+            revived = index in self.gone() and self._revived(index)
             self._tell(self._missing_words(index) + ("; it is started again" if revived else ""))
 
     def back(self, index: int) -> None:
@@ -154,7 +151,7 @@ class Membership:
             names = " and ".join(name_of(index) for index in sorted(self.missing))
             self._tell(f"the team rests and waits for {names} for at most {self._rejoin:g} s")
         late = clocks.monotonic() >= self._deadline
-        return late or any(not self._revived(index) for index in self.missing if self.ended(index))
+        return late or any(not self._revived(index) for index in self.missing if index in self.gone())
 
     def give_up(self) -> None:
         """End the run without who is missing."""
@@ -180,6 +177,6 @@ class Membership:
 
     def _revived(self, index: int) -> bool:
         """Start a process again that has ended; return whether that was done."""
-        revived = self._processes.revive(index)
+        revived = self._revive(index)
         self.revived += [index] * revived
         return revived

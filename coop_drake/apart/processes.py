@@ -21,7 +21,7 @@ from coop_drake.answers.budget import Budget
 from coop_drake.answers.log import SimulationLog
 from coop_drake.answers.plan import Plan
 from coop_drake.answers.plan_file import plan_digest
-from coop_drake.apart import REJOIN, RESTARTS
+from coop_drake.apart import RESTARTS
 from coop_drake.apart.faults import NO_FAULTS, Faults
 from coop_drake.apart.membership import TOLERATED, Processes
 from coop_drake.apart.messages import SUPERVISOR, WORLD, Goodbye, name_of
@@ -30,7 +30,7 @@ from coop_drake.apart.robot import RobotNode, RobotProcess, certified_age
 from coop_drake.apart.supervisor import SupervisorNode, SupervisorProcess
 from coop_drake.apart.team_files import AddressBook, KeyPair, local_book
 from coop_drake.apart.transport import Ends, Network
-from coop_drake.apart.world import PATIENCE, Pacing, SampleExchange
+from coop_drake.apart.world import Pacing, SampleExchange
 from coop_drake.diagram import brakes_of, build_world, control_period
 from coop_drake.diagram.knowledge import hold_of, robot_knowledge
 from coop_drake.diagram.station import build_station
@@ -51,9 +51,6 @@ _CONTEXT = get_context("fork") if sys.platform == "linux" else get_context("spaw
 
 _OPENING = 30.0
 """How long processes wait for each other at the start [s]: a slow machine imports Drake for some seconds."""
-
-_REPORTED = 0.1
-"""Simulated time between two reports of facts about the processes [s]: as often as people can read them."""
 
 
 def network_of(
@@ -238,16 +235,10 @@ def run_world(
     plan: Plan,
     network: Network,
     *,
-    processes: Processes | None = None,
     opening: float = 60.0,
-    pacing: Pacing | None = None,
-    patience: float = PATIENCE,
-    rejoin: float = REJOIN,
-    tell: Callable[[str], None] = lambda words: None,
-    before: Callable[[int], None] = lambda sample: None,
-    report: Callable[[dict[str, Any]], None] = lambda facts: None,
     progress: Progress | None = None,
     observer: Callable[[Sample], None] | None = None,
+    **options: Any,
 ) -> SimulationLog:
     """Wait for all robots and the supervisor, simulate the transport, and say goodbye to all.
 
@@ -255,48 +246,26 @@ def run_world(
         scenario: The scenario.
         plan: The plan that all have.
         network: What the world needs to speak with the team.
-        processes: Knows which processes have ended, and may start them again.
         opening: How long to wait for the others [s].
-        pacing: Keeps the pace of the wall clock, see ``SampleExchange``; as ``patience`` and ``before``.
-        patience: How long a process may take for an answer in lock-step [s].
-        rejoin: How long a team at rest waits for who is missing [s], by the wall clock.
-        tell: Is told what happens to processes.
-        before: Called before every sample with its number.
-        report: Called ten times in a simulated second, and at the end, with facts about the processes.
         progress: Called with the stage and the fraction done, if given.
         observer: Called with every accepted step.
+        options: As for ``SampleExchange``: ``processes``, ``pacing``, ``patience``, ``rejoin``, ``before``,
+            ``report`` and ``tell``.
 
     Raises:
         MessagingError: Somebody is missing at the start.
     """
     ends, outcome = Ends(network, WORLD), INTERRUPTED
-    known, every = processes or Processes(), max(1, round(_REPORTED / network.period))
-
-    def begin(sample: int) -> None:
-        before(sample)
-        if sample % every == 0:
-            report(exchange.facts())
-
-    exchange = SampleExchange(
-        ends,
-        network,
-        pacing=pacing,
-        tolerated=tolerated_age(scenario.deployment, plan.budget),
-        oldest=certified_age(plan.budget) + TOLERATED,
-        processes=known,
-        patience=patience,
-        rejoin=rejoin,
-        before=begin,
-        tell=tell,
-    )
+    options["tolerated"] = tolerated_age(scenario.deployment, plan.budget)
+    options["oldest"] = certified_age(plan.budget) + TOLERATED
+    exchange = SampleExchange(ends, network, **options)
     world = build_world(scenario, plan, exchange)
     exchange.brakes = brakes_of(scenario, world.team)
-    if pacing is not None:
-        gc.freeze()  # To collect garbage among all that was imported takes a tenth of a second.
+    gc.freeze()  # To collect garbage among all that was imported takes a tenth of a second.
     try:
-        ends.open(opening, known.gone)
+        ends.open(opening, exchange.membership.gone)
         log = run_loop(world, scenario, progress=progress, observer=observer)
-        report(exchange.facts())
+        exchange.report(exchange.facts())
         outcome = ARRIVED if log.reached and not log.violation else FAILED
         return log
     finally:
@@ -304,8 +273,7 @@ def run_world(
             ends.send(index, Goodbye(outcome))
         ends.close()
         world.release()
-        if pacing is not None:
-            gc.unfreeze()
+        gc.unfreeze()
 
 
 def simulate_in_processes(

@@ -395,35 +395,42 @@ class Client(_Socket):
         self.session = Session(lambda data: self._put((data,)), network.link(index, server))
         self._server, self._decoder = server, decoder_of(server, index)
         self._hello = Hello(PROTOCOL, index, network.scenario, network.plan)
+        self._happened = list[zmq.Event]()
         self._restart()
-        self._socket.setsockopt(zmq.IMMEDIATE, 1)
         if (key := network.book.key_of(server)) is not None:
             self._socket.curve_serverkey = key.encode()
         self._socket.connect(self.address)
 
     def _restart(self) -> None:
         """Ask for another session: the next server may be another process, which does not know this one."""
-        self._asked = -math.inf
+        self._connected, self._asked = False, -math.inf
         self.session.begin(secrets.randbits(32), is_open=False)
+
+    @property
+    def unsettled(self) -> bool:
+        """Whether there is something to do even where nothing comes."""
+        return bool(self._happened) or not self.session.open
 
     def poll(self) -> Received | None:
         """Return the server and its message, first the ``Welcome`` of a session; None for nothing."""
+        # First events, which count once all messages from before them are read: a goodbye precedes an end.
+        self._happened += self._events()
         for frames in self._frames():
             try:
                 if (message := self._take(frames)) is not None:
                     return self._server, message
             except RefusedError as refused:
                 self._refusals.add(refused)
-        # Only now: a goodbye comes just before its connection ends.
-        for event in self._events():
+        for event in self._happened:
             if event & _FAILURES:
                 self._refusals.add(RefusedError(Reason.HANDSHAKE))
                 self.trouble = "the connection was refused: a key is missing or wrong"
             elif event == zmq.Event.DISCONNECTED:
                 self._restart()
-            elif not self.session.open:
-                self._asked = -math.inf
-        if not self.session.open and time.monotonic() - self._asked >= _AGAIN:
+            else:
+                self._connected = True
+        self._happened.clear()
+        if self._connected and not self.session.open and time.monotonic() - self._asked >= _AGAIN:
             self._asked = time.monotonic()
             self.session.tell(self._hello)
         return None
@@ -550,7 +557,7 @@ class Ends:
 
     def _poll(self, seconds: float) -> None:
         """Wait until something comes, then take one message of every end, so that none waits for another."""
-        asking = [client for client in self.clients.values() if not client.session.open]
+        asking = [client for client in self.clients.values() if client.unsettled]
         limit = min(max(seconds, 0.0), _AGAIN if asking else math.inf)
         ready = [self._owners[socket] for socket, _ in self._poller.poll(math.ceil(1e3 * limit))]
         for end in dict.fromkeys((*ready, *asking)):

@@ -35,6 +35,9 @@ PATIENCE = 5.0
 _ROUNDING = 1e-6
 """Differences of times that are no difference [s]."""
 
+_REPORTED = 0.1
+"""Simulated time between two reports of facts about the processes [s]: as often as people can read them."""
+
 _REHEARSALS = 20
 """How often everybody is asked what it would log before the first sample by the wall clock [-]: the first
 answers of a process take several times as long as the later ones."""
@@ -115,6 +118,7 @@ class SampleExchange:
         patience: How long a process may take for an answer in lock-step [s].
         rejoin: How long a team at rest waits for who is missing [s], by the wall clock.
         before: Called before every sample with its number.
+        report: Called ten times in a simulated second with facts about the processes.
         tell: Is told what happens to processes.
 
     Attributes:
@@ -136,10 +140,12 @@ class SampleExchange:
         patience: float = PATIENCE,
         rejoin: float = REJOIN,
         before: Callable[[int], None] = lambda sample: None,
+        report: Callable[[dict[str, Any]], None] = lambda facts: None,
         tell: Callable[[str], None] = lambda words: None,
     ) -> None:
         self._ends, self._patience, self._before, self._pacing = ends, patience, before, pacing
         self._everyone, self._period = [*range(len(network.book.robots)), SUPERVISOR], network.period
+        self.report, self._every = report, max(1, round(_REPORTED / network.period))
         self._clock, self._oldest = network.faults.clock, oldest + _ROUNDING
         self.membership = Membership(
             tolerated=tolerated, rejoin=rejoin, processes=processes or Processes(), tell=tell
@@ -175,7 +181,7 @@ class SampleExchange:
         shown = self._last.get((index, Status if index == SUPERVISOR else Telemetry))
         state, since = STATES[self._states.get(index, FOLLOWS)], self.missing.get(index)
         there = "there" if index == SUPERVISOR else state
-        missing = "gone" if self.membership.ended(index) else "silent"
+        missing = "gone" if index in self.membership.gone() else "silent"
         return {
             "name": name_of(index),
             "state": there if since is None else missing,
@@ -217,6 +223,8 @@ class SampleExchange:
         """Let everybody compute once, which shows before the update what it would log."""
         self._stamps = [np.full(2, time) for _ in measured] if stamps is None else stamps
         self._before(self.sample)
+        if self.sample % self._every == 0:
+            self.report(self.facts())
         if self._pacing is not None:
             for _ in range(0 if self.sample else _REHEARSALS):
                 self._ask(time, measured, step=False)
@@ -334,7 +342,7 @@ class SampleExchange:
 
     def _has_gone(self, index: int) -> bool:
         """Whether a process has ended, or its connection is closed, which a sign of life shows."""
-        return self.membership.ended(index) or not self._ends.send(index, Welcome())
+        return index in self.membership.gone() or not self._ends.send(index, Welcome())
 
     def _lose(self, indices: Any) -> None:
         """Go on without processes; what they have sent to the team need not be waited for."""
