@@ -12,12 +12,13 @@ from time import perf_counter
 import numpy as np
 
 from benchmarks.departures import deployment_of
+from benchmarks.one_process import DirectExchange, simulate_apart
 from benchmarks.ring_teams import ring_transport
 from benchmarks.rows import Row
 from benchmarks.tasks import Task
 from coop_drake import Found, Plan, load_scenario, plan
 from coop_drake.answers.log import SimulationLog
-from coop_drake.apart import DirectExchange, simulate_apart, simulate_in_processes
+from coop_drake.apart import simulate_in_processes
 from coop_drake.apart.membership import Stop
 from coop_drake.diagram import control_period
 from coop_drake.errors import PlanError

@@ -9,11 +9,11 @@ from functools import partial
 import numpy as np
 
 from benchmarks.departures import deployment_of, planned_transport
+from benchmarks.one_process import DirectExchange, simulate_apart
 from benchmarks.rejoining import KILLED, label_of
 from benchmarks.rows import Row
 from benchmarks.tasks import Task
 from coop_drake import Plan, load_scenario
-from coop_drake.apart import DirectExchange, simulate_apart
 from coop_drake.apart.membership import TOLERATED
 from coop_drake.apart.messages import SUPERVISOR
 from coop_drake.apart.node import Stillness

@@ -1,4 +1,3 @@
-from .one_process import DirectExchange, simulate_apart
 from .processes import (
     LocalTeam,
     network_of,
@@ -15,7 +14,6 @@ REJOIN: float
 RESTARTS: int
 
 __all__ = [
-    "DirectExchange",
     "LocalTeam",
     "RobotNode",
     "SupervisorNode",
@@ -23,7 +21,6 @@ __all__ = [
     "robots_of",
     "run_node",
     "run_world",
-    "simulate_apart",
     "simulate_in_processes",
     "wall_clock",
 ]

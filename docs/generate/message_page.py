@@ -5,6 +5,9 @@ from __future__ import annotations
 import inspect
 from typing import Any
 
+import msgspec
+from msgspec.inspect import BoolType, FloatType, IntType, Metadata, StrType, VarTupleType
+
 from coop_drake.apart.membership import TOLERATED
 from coop_drake.apart.messages import (
     KINDS,
@@ -58,8 +61,8 @@ _EXAMPLE = encode(7, 1, Ready(3, ready=True)).hex(" ")
 
 _TOP = f"""# Messages between processes
 
-What a world in another language needs to know. Meaning, type and unit of every field stand with the types by
-which messages are checked, in `messages.py` of [apart](../../coop_drake/apart). [Processes of their
+What a world in another language needs to know. What each field means stands with the types by which
+messages are checked, in `messages.py` of [apart](../../coop_drake/apart). [Processes of their
 own](../how_to/apart.md) says how to start them. `python -m docs.generate` makes this page.
 
 ## Bytes
@@ -106,8 +109,19 @@ def message_page() -> str:
 def _line(cls: Any, sender: str) -> str:
     """Return the line of one message: who sends it, what it says, and its fields."""
     about = " ".join((inspect.getdoc(cls) or "").split("\n\n")[0].split())
-    fields = ", ".join(f"`{name}`" for name in cls.__struct_fields__)
+    described: Any = msgspec.inspect.type_info(cls)
+    fields = ", ".join(f"`{field.name}` ({_type(field.type)})" for field in described.fields)
     return f"- **{cls.__name__}**, from {sender}: {about}" + (f" Fields: {fields}." if fields else "")
+
+
+def _type(kind: Any) -> str:
+    """Return the type of a field in a word, with its unit."""
+    words: dict[Any, str] = {IntType: "integer", FloatType: "real", BoolType: "truth value", StrType: "text"}
+    if isinstance(kind, VarTupleType):
+        return f"list of {_type(kind.item_type)}s"
+    if isinstance(kind, Metadata):
+        return _type(kind.type) + (f" [{kind.extra['unit']}]" if kind.extra else "")
+    return words[type(kind)]
 
 
 def _world() -> str:

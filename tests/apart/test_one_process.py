@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from coop_drake.apart import DirectExchange, simulate_apart
+from benchmarks.one_process import DirectExchange, simulate_apart
 from coop_drake.apart.messages import Ready, Switch
 from coop_drake.diagram import control_period
 from coop_drake.errors import ScenarioError

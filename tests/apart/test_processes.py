@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 import zmq
 
-from coop_drake.apart import DirectExchange, LocalTeam, network_of, run_world, simulate_apart
+from benchmarks.one_process import DirectExchange, simulate_apart
+from coop_drake.apart import LocalTeam, network_of, run_world
 from coop_drake.apart.faults import NO_FAULTS, ChannelFaults, ClockFault, Faults, Gap
 from coop_drake.apart.messages import PROTOCOL, SUPERVISOR, WORLD, Effort, Hello, Ready, Switch, encode
 from coop_drake.apart.world import Pacing

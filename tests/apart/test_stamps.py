@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from benchmarks.one_process import DirectExchange, simulate_apart
 from coop_drake.answers.budget import Budget
-from coop_drake.apart import DirectExchange, simulate_apart
 from coop_drake.apart.robot import StampCheck, certified_age
 from coop_drake.scenario import Measurements
 from tests.apart.test_stops_under_a_budget import transport  # noqa: F401

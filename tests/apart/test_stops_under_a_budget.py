@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from benchmarks.one_process import DirectExchange, simulate_apart
 from coop_drake.answers import load_plan
-from coop_drake.apart import DirectExchange, simulate_apart
 from coop_drake.cli.task import read_task
 from coop_drake.errors import RefusalError
 from coop_drake.simulation import build_maps

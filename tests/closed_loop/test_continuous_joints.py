@@ -6,8 +6,9 @@ from math import pi
 import numpy as np
 import pytest
 
+from benchmarks.one_process import DirectExchange, simulate_apart
 from coop_drake.answers.plan import Found
-from coop_drake.apart import DirectExchange, RobotNode, simulate_apart
+from coop_drake.apart import RobotNode
 from coop_drake.apart.messages import Place, Switch
 from coop_drake.chain import plan
 from coop_drake.diagram import build_station

@@ -6,7 +6,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from coop_drake.apart import simulate_apart
+from benchmarks.one_process import simulate_apart
 from coop_drake.compiled_loop import prepare, run
 from coop_drake.scenario import (
     ActuatorLimits,

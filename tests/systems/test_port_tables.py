@@ -7,8 +7,8 @@ from dataclasses import replace
 import pytest
 from pydrake.systems.framework import Diagram, LeafSystem
 
+from benchmarks.one_process import DirectExchange
 from coop_drake import systems
-from coop_drake.apart import DirectExchange
 from coop_drake.diagram import build_closed_loop, build_world
 from coop_drake.scenario import (
     ActuatorLimits,
