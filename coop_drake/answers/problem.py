@@ -26,24 +26,20 @@ class PlannerSettings:
     """How hard the planner tries.
 
     Attributes:
-        margin: First margin rho tried [m]; smaller ones follow until a plan is found, 0 last. For very large
-            or very small teams, a margin that is unreasonable for their size is replaced by the default,
-            scaled to the team.
-        slice_overlap: Overlap of neighbouring slices as a fraction of their width, for under-cells only.
+        margin: First margin rho tried; smaller ones follow, 0 last. Scaled for very large or very small teams
+            [m].
+        slice_overlap: Overlap of neighbouring slices over their width, for under-cells only.
         angle_resolution: Slices of angles are not split below this width [rad].
         length_resolution: Slices of prismatic joints are not split below this width [m].
-        max_slices: Work budget of explorations: none begins once all of them have made so many slices. The
-            last one may exceed it by as many slices as it was allowed. If bases are squeezed between walls,
-            that of a whole team of three or more robots may then go on to so many slices of its own.
-        min_clearance: Least clearance of the object's path in a cell, half the width of the passage there,
-            and of the target where the cell is left [m]. Narrower ones take minutes. For very large or very
-            small teams it is scaled to the team.
+        max_slices: Work budget: no exploration begins once all of them have made so many slices. The last one
+            may exceed it.
+        min_clearance: Least clearance of the object's path in a cell (half the passage), and of the target.
+            Narrower ones take minutes. Scaled for very large or very small teams [m].
         max_transition_time: Longest estimated time of one transition that is accepted [s].
-        effort: Work spent on a quicker transport once there is a certified path, as a share of the default:
-            with 0 the plan follows the path that was found first, with 2 twice the work is spent. It is
-            counted in samples and moves, not in seconds.
+        effort: Work spent on a quicker transport: 0 takes the first path that is found, 2 is twice the
+            default. It counts samples and moves, not seconds.
         strategy: ``portfolio`` samples, certifies and proves; ``cells`` explores by cells alone; ``paper``
-            explores as the paper's Algorithms 1 and 2 are printed, at margin zero.
+            explores as the paper's algorithms are printed, at margin zero.
     """
 
     margin: NotNegative = 0.1

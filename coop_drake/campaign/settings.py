@@ -22,23 +22,19 @@ class Runs:
 
     Attributes:
         scenarios: Scenario files, relative to the campaign file, or names of shipped scenarios.
-        count: How many runs of every scenario and every combination of the grid.
-        set: Values of keys of the scenario in every run and in the plan, by their dotted keys.
-        vary: Distributions from which every run draws the values of keys of the scenario, by dotted keys.
-        grid: Values of keys of the scenario of which every combination is run, by their dotted keys. Plans
-            do not know what vary and grid say of deployment, control, plant and simulator.
+        count: Runs of every scenario and every combination of the grid.
+        set: Values in every run and in the plan, by their dotted keys.
+        vary: Distributions from which every run draws values, by dotted keys.
+        grid: Values of which every combination is run, by dotted keys.
         seed: Seed of all that is drawn.
-        tier: ``drake`` for the loop of Drake's systems, ``compiled`` for the compiled loop, ``both`` for
-            every run in each of them.
-        paired: With ``compiled``, how many of the first runs of every scenario are made by Drake's loop,
-            too.
-        budget: Under which budget the plans must provably hold, as ``plan --budget`` takes it, a file
-            relative to the campaign file if it is there; null for what every scenario requires.
-        batch: Runs that one process makes, and one file holds; null for 20 of Drake's loop, and 2000 of the
-            compiled one.
-        time_limit: Longest that a process may take for each of its runs; for the first one ten minutes more,
-            in which it starts and may compile kernels [s].
-        keep: Of which of Drake's runs the log is kept, too; any run can be made again later.
+        tier: Which loop makes the runs; ``both`` makes each run twice.
+        paired: With ``compiled``, how many of the first runs of every scenario Drake's loop makes, too.
+        budget: Under which budget the plans must hold, as ``plan --budget`` takes it; null for what the
+            scenarios require.
+        batch: Runs of one process and one file; null for 20 of Drake's loop, 2000 of the compiled one.
+        time_limit: Longest time for each run of a process; ten minutes more for the first one, which may
+            compile kernels [s].
+        keep: Of which of Drake's runs the log is kept.
     """
 
     scenarios: tuple[str, ...]

@@ -153,20 +153,18 @@ class FixedGains:
         damping: zeta [1/s].
         governor_gain: K_G [-].
         smoothing: c of the governor's root; 0 is the printed root [m].
-        funnel: ``exponential`` or ``quintic``.
+        funnel: Law of the funnels.
         angle_decay_rate: lambda of the object's angle [1/s].
         joint_decay_rate: lambda of every joint [1/s].
         log_gain: kappa [rad^2/s^2 or m^2/s^2].
         position_gain: k1 [1/s].
         rate_gain: k2 [1/s].
-        limit_gain: g, the rate at which an axis may approach a limit of its rate, if there is one; the
-            paper has no such limits [1/s].
+        limit_gain: g, the rate at which an axis may approach a limit of its rate [1/s].
         ramp_rate: mu, the rate at which k1 is ramped in; 0 for k1 at once [1/s].
-        saturation: Smallest distance to a funnel bound with which the law computes, over the width [-]. By
-            default so small that it only bounds the trial steps of an integrator.
+        saturation: Smallest distance to a funnel bound with which the law computes, over the width [-].
         hand_over_time: T, in which the commands of the last cell fade; 0 for a step, as printed [s].
-        energy_factor: A transition is entered below this multiple of the energy at rest ...
-        energy_allowance: ... plus this multiple of kappa.
+        energy_factor: Largest energy with which a transition is entered, over the energy at rest.
+        energy_allowance: Energy that is added to this limit, over kappa.
     """
 
     stiffness: Positive = 50.0
@@ -199,8 +197,7 @@ class ScheduledGains:
     fraction of 1 / tau, and all others by the rate gain k2.
 
     Attributes:
-        command_age: tau [s]; null for that of the scenario's ``deployment``, or for 15 ms if that is
-            less.
+        command_age: tau; null for that of ``deployment``, at least 15 ms [s].
         age_phase: k2 times tau, the phase by which the age turns the rate loop [rad].
         max_rate_gain: Largest k2 [1/s].
         position_fraction: k1 over k2 [-].
@@ -213,23 +210,22 @@ class ScheduledGains:
         smoothing: c of the governor's root [m].
         funnel_acceleration: Largest acceleration of a funnel bound, for which lambda is chosen [rad/s^2 or
             m/s^2].
-        goal_acceleration: The same over k2^2 and the goal interval's width: what an error of the model lets
-            a narrow interval bear [-].
-        turning_coupling: Largest acceleration of a joint over the square of the rate at which the object
-            turns, if nothing were commanded [-].
-        turning_acceleration: Largest such acceleration over k2^2 and the joint's goal interval's width [-].
+        goal_acceleration: Largest acceleration of a funnel bound over k2^2 and the goal interval's width [-].
+        turning_coupling: Largest acceleration of a joint without commands, over the square of the turn rate
+            of the object [-].
+        turning_acceleration: Largest such acceleration over k2^2 and the width of the joint's goal interval
+            [-].
         min_decay_rate: Smallest lambda [1/s].
         decay_fraction: Largest lambda over k2 [-].
         max_log_gain: Largest kappa [rad^2/s^2 or m^2/s^2].
-        log_fraction: Largest stiffness 16 kappa / w^2 of the log term in the middle of the goal interval, of
-            width w, over k2^2 [-].
+        log_fraction: Largest stiffness 16 kappa / w^2 of the log term over k2^2, in a goal interval's middle,
+            w its width [-].
         log_acceleration: Largest kappa |a s| when a transition is entered at rest [rad/s^2 or m/s^2].
         saturation: Smallest distance to a funnel bound with which the law computes, over the width [-].
-        hand_over_time: T, in which the commands of the last cell fade; longer where K could not fall from its
-            largest to its smallest value as quickly [s].
-        energy_factor: A transition is entered below this multiple of the energy at rest ...
-        energy_allowance: ... plus this multiple of kappa ...
-        entry_rate: ... plus the energy v^2 / 2 of this rate v [rad/s or m/s].
+        hand_over_time: T, in which the commands of the last cell fade; longer if K must fall far [s].
+        energy_factor: Largest energy with which a transition is entered, over the energy at rest.
+        energy_allowance: Energy that is added to this limit, over kappa.
+        entry_rate: A rate v whose energy v^2 / 2 is added as well [rad/s or m/s].
     """
 
     command_age: Positive | None = None

@@ -80,10 +80,9 @@ class Wave:
     """An error that is a number for half a period, and its opposite for the other half.
 
     Attributes:
-        size: Magnitude of the error, in the unit of what is measured; 0 for no error.
-        period: Time from one change to the positive error to the next; the error is constant if the transport
-            takes no longer than a half of it [s].
-        phase: How much of a period has passed at the start [-].
+        size: Magnitude, in the unit of what is measured.
+        period: Time from one change to the positive error to the next [s].
+        phase: Share of a period that has passed at the start [-].
     """
 
     size: NotNegative = 0.0
@@ -96,14 +95,14 @@ class Waves:
     """Bounded errors of what robots measure, which all robots have alike.
 
     Attributes:
-        x: Of the object's position along x of W [m].
-        y: Of the object's position along y of W [m].
+        x: Of the position along x of W [m].
+        y: Of the position along y of W [m].
         angle: Of the object's angle [rad].
-        joints: Of the position of every joint [rad or m].
-        velocity_x: Of the velocity of every base along x of W [m/s].
-        velocity_y: Of the velocity of every base along y of W [m/s].
-        turn_rate: Of the angular rate of every base [rad/s].
-        joint_rates: Of the rate of every joint [rad/s or m/s].
+        joints: Of every joint [rad or m].
+        velocity_x: Of every base's velocity along x of W [m/s].
+        velocity_y: Of every base's velocity along y of W [m/s].
+        turn_rate: Of every base's turn rate [rad/s].
+        joint_rates: Of every joint's rate [rad/s or m/s].
     """
 
     x: Wave = field(default_factory=Wave)
@@ -140,15 +139,14 @@ class Measurements:
 
     Attributes:
         position_noise: Standard deviation of every measured position [m].
-        angle_noise: Standard deviation of every measured angle and of every joint's position [rad or m].
-        rate_noise: Standard deviation of every measured rate [m/s or rad/s].
-        delay: Age of a measurement when the controller gets it, rounded up to whole control periods [s].
-        loss: Probability that a measurement is lost, so that the last one is used again; of the pose and of
-            the robot's own state separately [-].
-        late: Probability that a measurement which is not lost arrives late, and is used from then on unless
-            a newer one has arrived [-].
-        late_by: How much later, rounded up to whole control periods, at least one [s].
-        waves: Bounded errors that change their sign, instead of noise or besides.
+        angle_noise: Standard deviation of measured angles and joint positions [rad or m].
+        rate_noise: Standard deviation of measured rates [m/s or rad/s].
+        delay: Age of a measurement when the controller gets it, rounded up to control periods [s].
+        loss: Probability that a measurement is lost and the last one is used again; of the pose and of the
+            robot's own state separately [-].
+        late: Probability that a measurement arrives late; it is used unless a newer one has arrived [-].
+        late_by: Delay of a late measurement, rounded up to control periods [s].
+        waves: Bounded errors that change their sign.
     """
 
     position_noise: NotNegative = 0.0
@@ -169,8 +167,7 @@ class ActuatorLimits:
         base_force: Largest force of every base, as the length of a vector [N].
         base_torque: Largest torque of every base [N m].
         joint_effort: Largest effort of every joint [N m or N].
-        lag: Time constant with which every effort follows its command, as a first-order low pass [s]; 0 for
-            actuators that follow at once.
+        lag: Time constant of a first-order lag of every effort behind its command [s].
     """
 
     base_force: Positive | None = None
@@ -185,8 +182,8 @@ class Messages:
 
     Attributes:
         loss: Probability that a report is lost [-].
-        repeat: Probability that a report arrives a second time, one delay later [-].
-        delay: Time that a report travels, rounded up to whole control periods [s].
+        repeat: Probability that a report arrives twice, one delay apart [-].
+        delay: Time that a report travels, rounded up to control periods [s].
     """
 
     loss: Probability = 0.0
@@ -216,8 +213,8 @@ class Silence:
     Attributes:
         begin: When it falls silent [s].
         duration: For how long; null for the rest of the run [s].
-        motors: ``working`` for motors that go on as they are told, ``held`` for motors that give their last
-            effort all the time, ``limp`` for motors that give none.
+        motors: ``working``: motors go on as they are told; ``held``: they give their last effort; ``limp``:
+            they give none.
     """
 
     begin: NotNegative
@@ -276,18 +273,17 @@ class RobotDepartures:
     """What is wrong with a single robot.
 
     Attributes:
-        pose_bias: Constant error of the object's pose as it measures it.
-        odometry_scale: By how much it overestimates the rates of its base, relative; may be negative [-].
-        sample_offset: By how much later than the others it measures and computes in every control period,
-            less than a period; needs a control rate [s].
-        clock_error: By how much its clock is ahead of the others', from which the time since a cell's entry
-            follows; may be negative [s].
-        switch_delay: How much later than the others it hears that the cell was switched, rounded up to whole
-            control periods; needs a control rate [s].
+        pose_bias: Constant error of the object's measured pose.
+        odometry_scale: By how much it overestimates the rates of its base, relative [-].
+        sample_offset: By how much later than the others it measures and computes, less than a period; needs a
+            control rate [s].
+        clock_error: By how much its clock is ahead of the others' [s].
+        switch_delay: How much later than the others it hears of a new cell, rounded up to control periods;
+            needs a control rate [s].
         silence: When it sends no reports, null for never.
         deaf: When it hears nothing of the hold supervisor, null for never.
         blocked: When the wheels of its base are blocked, null for never.
-        slip: When they slip, null for never.
+        slip: When the wheels of its base slip, null for never.
     """
 
     pose_bias: PoseBias = field(default_factory=PoseBias)
@@ -311,8 +307,8 @@ class Floor:
     """Forces of the floor on the team.
 
     Attributes:
-        coulomb_friction: Friction force against the motion of every base, whatever its speed [N].
-        viscous_friction: Friction force against the motion of every base for each unit of its speed [N s/m].
+        coulomb_friction: Friction force on every base, whatever its speed [N].
+        viscous_friction: Friction force on every base for each unit of its speed [N s/m].
         slope: Angle by which the floor falls along the x axis of W [rad].
     """
 
@@ -326,9 +322,9 @@ class JointFriction:
     """Friction of every joint, beside the damping that its model has.
 
     Attributes:
-        coulomb: Coulomb friction: against the motion, whatever its rate; a joint at rest is held by up to as
-            much [N m, or N for a joint that slides].
-        viscous: Friction against the motion for each unit of the rate [N m s or N s/m].
+        coulomb: Friction whatever the rate; a joint at rest is held by up to as much [N m, or N for a joint
+            that slides].
+        viscous: Friction for each unit of the rate [N m s or N s/m].
     """
 
     coulomb: NotNegative = 0.0
@@ -340,7 +336,7 @@ class Push:
     """A constant force from outside on one body for a while.
 
     Attributes:
-        body: Name of the object or of a robot, whose base is pushed; the force acts at the origin of L or Bk.
+        body: The object or a robot, pushed at the origin of L or Bk.
         force: Force in W [N].
         torque: Torque about the vertical axis [N m].
         time: When the push begins [s].
@@ -362,7 +358,7 @@ class StartOffset:
         x: Of the object, along x of W [m].
         y: Of the object, along y of W [m].
         theta: Of the object's angle [rad].
-        joints: Of every joint, robot by robot in their order; empty for none [rad or m].
+        joints: Offset of every joint, robot by robot; empty for none [rad or m].
     """
 
     x: Real = 0.0
@@ -378,23 +374,20 @@ class Deployment:
     Attributes:
         preset: The departures of a usual team, which the keys beside it replace one by one. ``mobile_base``:
             200 Hz, measurements 10 ms late with noise of 1 mm, 0.5 mrad and 0.01 /s, masses believed 20 % too
-            large, base forces up to 650 N, actuators that lag by 5 ms, a fifth of the reports lost. A
-            scenario that was read holds the departures themselves.
-        control_rate: How often controllers compute a new effort, which is held in between; null for
-            controllers in continuous time [Hz].
-        mass_error: By how much robots overestimate all masses and inertias, relative; may be negative [-].
+            large, base forces up to 650 N, actuators that lag by 5 ms, a fifth of the reports lost.
+        control_rate: How often controllers compute a new effort; null for continuous time [Hz].
+        mass_error: By how much robots overestimate all masses and inertias, relative [-].
         measurements: Noise and delay of what robots measure; needs a control rate.
         actuators: Largest efforts of the actuators.
         messages: Losses and delay of ready reports; needs a control rate.
-        robots: What is wrong with single robots, by name; ``"*"`` for all that have no entry of their own.
+        robots: What is wrong with single robots, by name; ``"*"`` for all without an entry.
         floor: Friction and slope of the floor.
         joint_friction: Friction of every joint, which no robot knows of.
         pushes: Forces from outside.
-        start_offset: How far the team stands away from the plan's start.
-        clock_error: By how much a robot's clock may be wrong, so that what it measures was measured so much
-            earlier or later than it takes it for; needs a control rate [s].
-        budget: Under which budget of these departures a plan must hold: ``none``, ``position`` for
-            the object's position alone, ``all`` for angles and joints, too; needs a control rate.
+        start_offset: How far the team stands off the plan's start.
+        clock_error: Largest error of the time at which robots believe to measure; needs a control rate [s].
+        budget: Under which budget of these departures a plan must hold: ``position`` for the object's
+            position alone, ``all`` for angles and joints, too; needs a control rate.
         seed: Seed of noise and losses.
     """
 

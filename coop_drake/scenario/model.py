@@ -39,17 +39,17 @@ class Workspace:
     Loading a scenario reads the floor plan; a loaded workspace always has rings and no file.
 
     Attributes:
-        outer: Corners of the outer ring, each (x, y) in W [m]; the last is joined to the first.
+        outer: Corners (x, y) of the outer ring in W; the last is joined to the first [m].
         holes: Rings of obstacles inside, each like ``outer``.
-        file: Instead of rings a drawing (``.svg``, ``.dxf``, ``.geojson``, ``.wkt``) or a ROS occupancy map
-            (``.yaml``): a path relative to the scenario, or ``package://``. The floor is the room in which
-            the object starts.
-        unit: Unit of the drawing's coordinates; null for the one that the file states.
+        file: Instead of rings a drawing (``.svg``, ``.dxf``, ``.geojson``, ``.wkt``) or a ROS map
+            (``.yaml``), relative to the scenario or ``package://``. The floor is the room in which the object
+            starts.
+        unit: Unit of the drawing's coordinates; null for the file's own.
         scale: Factor on all lengths of the file, 50 for a drawing at 1:50 [-].
         layers: Layers of the drawing that hold walls; empty for all visible ones.
-        tolerance: How far walls may grow where that saves corners [m]; null for 1 cm, or for one and a half
-            cells of an occupancy map.
-        gap: Lines of a drawing that end this close to another line are joined to it [m].
+        tolerance: How far walls may grow to save corners; null for 1 cm, or one and a half cells of a map
+            [m].
+        gap: Gaps of a drawing up to this size are closed [m].
         unknown_is_free: Whether the unknown cells of a map count as floor.
         notes: Of a loaded workspace, what the reader of its file left out or assumed, each with the file.
     """
@@ -97,8 +97,8 @@ class Start:
 
     Attributes:
         object: The object's pose.
-        joints: For each robot the positions of its joints, from the base to the end effector [rad or m];
-            those of joints without limits may be in any turn.
+        joints: For each robot its joints from the base to the end effector; circles may be in any turn [rad
+            or m].
     """
 
     object: ObjectPose
@@ -126,9 +126,8 @@ class Goal:
 
     Attributes:
         object: The object's pose; theta is taken modulo 2 pi.
-        joints: For each robot that has a goal of its own the positions of its joints, null for a joint that
-            is free [rad or m]. All joints of other robots are free. Joints without limits are taken modulo
-            2 pi.
+        joints: For each robot that has a goal of its own its joints, null for a free one. Joints of other
+            robots are free. Circles are taken modulo 2 pi [rad or m].
         tolerances: Largest errors with which the goal counts as reached.
     """
 
@@ -160,8 +159,8 @@ class MapSettings:
     """Accuracy of the harmonic maps of the cells.
 
     Attributes:
-        tolerance: Largest estimated error of a harmonic map onto the disk of radius 1 [-]. Cells that cannot
-            be mapped as accurately are refused.
+        tolerance: Largest estimated error of a map onto the disk of radius 1. Cells that cannot be mapped so
+            well are refused [-].
     """
 
     tolerance: MapTolerance = TOLERANCE
@@ -172,9 +171,8 @@ class PlantSettings:
     """Model of the grasps in the simulated plant; controllers are the same for all.
 
     Attributes:
-        grasps: ``joints`` for one kinematic tree rooted at the object, with exactly rigid grasps, in
-            continuous time; ``constraints`` for one tree per robot, held at the object by weld constraints,
-            in discrete time.
+        grasps: ``joints``: one tree rooted at the object, rigid grasps, continuous time; ``constraints``: one
+            tree per robot, welded to the object, discrete time.
         time_step: Time step of the plant in discrete time [s].
     """
 
@@ -193,11 +191,10 @@ class SimulatorSettings:
 
     Attributes:
         max_time: The run fails if the goal is not reached by then [s].
-        integration_scheme: Drake's name of the integrator; for sampled controllers ``bogacki_shampine3`` is
-            used instead of ``runge_kutta5``.
+        integration_scheme: Drake's integrator; sampled controllers use ``bogacki_shampine3`` instead of
+            ``runge_kutta5``.
         max_step_size: Longest step [s].
-        accuracy: Relative accuracy of the error-controlled step [-]. The control laws are not smooth, and the
-            largest error of ``runge_kutta3`` with 1e-3 is smaller than that of ``runge_kutta5`` with 1e-4.
+        accuracy: Relative accuracy of the error-controlled step.
     """
 
     max_time: Positive = 300.0
@@ -231,8 +228,8 @@ class RobotLimits:
         base_speed: Largest speed of the base's frame Bk in W [m/s].
         base_turn_rate: Largest rate of the base's angle in W [rad/s].
         joint_rates: Largest rates of the joints, from the base to the end effector; a single one counts for
-            all joints [rad/s or m/s].
-        joint_accelerations: Largest accelerations of the joints, in the same way [rad/s^2 or m/s^2].
+            all [rad/s or m/s].
+        joint_accelerations: Largest accelerations of the joints, likewise [rad/s^2 or m/s^2].
     """
 
     base_speed: Positive | None = None
@@ -252,11 +249,10 @@ class Hold:
     Attributes:
         at: Times at which the team is told to hold [s].
         duration: How long it is told so each time [s].
-        energy: Largest energy of an axis over the bound with which its cell may be entered; a robot that sees
-            more, or that its Delta E is negative, asks for a hold; null for never [-].
-        silence: Longest time without a message of a robot, after which the team is held, and of a robot
-            without a message of the supervisor, after which it holds by itself and asks for a hold; null to
-            wait for ever [s]. Needs a control rate.
+        energy: A robot asks for a hold when the energy of an axis is above so many times the bound with which
+            its cell may be entered, or its Delta E is negative; null for never [-].
+        silence: The team is held when a robot was not heard for so long; a robot that has heard nothing of
+            the supervisor for so long holds by itself. Null to wait for ever; needs a control rate [s].
     """
 
     at: tuple[NotNegative, ...] = ()
@@ -270,10 +266,8 @@ class Control:
     """Additions to the controllers, from what each robot measures and commands itself; no message is needed.
 
     Attributes:
-        predictor: Whether robots compute with the present, predicted from measurements of the known delay
-            ``deployment.measurements.delay`` and from their commands since; nothing without a delay.
-        observer: Whether robots estimate slow disturbances, such as friction, a slope or a push, and
-            compensate them.
+        predictor: Whether robots predict the present from late measurements and their commands since.
+        observer: Whether robots estimate slow disturbances, such as friction or a push, and compensate them.
         hold: When the team is held; null for never.
     """
 
@@ -329,22 +323,21 @@ class Scenario:
     Attributes:
         workspace: The floor.
         directives: Drake's model directives: the object, two or more robots, a weld for every grasp.
-        start: Pose of the object and positions of the joints at the beginning.
+        start: Configuration at the beginning.
         goal: Pose of the object, and positions of joints if any, at the end.
         object: Name of the object's model.
-        fixed_joints: For some robots positions of joints that never move, by joint name or by a pattern such
-            as ``*wheel*`` [rad or m]; null for a joint that a pattern matches and that shall move. A joint
-            that moves bodies out of the plane must be fixed.
-        load_shares: Fraction of the object's wrench that each robot applies; the sum is 1. Empty for equal
-            fractions [-].
+        fixed_joints: By robot, positions of joints that never move, by name or by a pattern such as
+            ``*wheel*``; null excludes a joint from a pattern. A joint that moves bodies out of the plane must
+            be fixed [rad or m].
+        load_shares: Fraction of the object's wrench that each robot applies; they add up to 1. Empty for
+            equal ones [-].
         planner: Effort and resolution of the planner.
         gains: The gain sets.
         maps: Accuracy of the harmonic maps.
         plant: Model of the grasps in the simulated plant.
         simulator: Numerical integration of the closed loop.
-        limits: Largest speeds and accelerations of robots, by name; ``"*"`` for all that have no entry of
-            their own. Transports are planned and driven so that these, and those of the robots' models, are
-            kept.
+        limits: Largest speeds and accelerations, by robot; ``"*"`` for all robots without an entry. Plans and
+            controllers keep these and those of the models.
         deployment: Departures of the real team from the ideal one.
         control: Additions to the controllers.
         visualization: Appearance of recordings.

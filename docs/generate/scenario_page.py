@@ -48,20 +48,11 @@ def _lists(found: Iterable[Section]) -> Iterator[str]:
     alone = {same[0] for same in places.values() if len(same) == 1}
     for (about, keys), same in places.items():
         inside = f"{same[0]}." if same[0] else ""
-        yield "\n".join(
-            [
-                f"## `{same[0]}`" if same[0] else "## The file",
-                "",
-                about,
-                *(
-                    ["", f"The same keys stand in {', '.join(f'`{path}`' for path in same[1:])}."]
-                    * (len(same) > 1)
-                ),
-                "",
-                *(_entry(key) for key in keys if f"{inside}{key.name}" not in alone),
-                "",
-            ]
-        )
+        entries = [_entry(key) for key in keys if f"{inside}{key.name}" not in alone]
+        others = f"The same keys stand in {', '.join(f'`{path}`' for path in same[1:])}.\n"
+        heading = f"## `{same[0]}`" if same[0] else "## The file"
+        if entries:
+            yield "\n".join([heading, "", about, "", *([others] if len(same) > 1 else []), *entries, ""])
 
 
 def _entry(key: ScenarioKey) -> str:
@@ -73,6 +64,9 @@ def _entry(key: ScenarioKey) -> str:
 
 
 _SHORTER = (
+    (r"a finite number", "number"),
+    (r"a list of 2, each entry number", "2 numbers"),
+    (r"a mapping with a tag, one of ", ""),
     (r"a mapping from names to ", "by name: "),
     (r"a list, each entry ", "list of "),
     (r"zero or a positive (whole number|number)", r"\1 ≥ 0"),
@@ -85,6 +79,7 @@ _SHORTER = (
     (r"whole number", "integer"),
     (r"number ([≥>])", r"\1"),
     (r"\bnumber from ", ""),
+    (r"list of number\b", "list of numbers"),
 )
 """How types and limits in words are said on the pages, in a few characters."""
 
