@@ -95,14 +95,14 @@ class Waves:
     """Bounded errors of what robots measure, which all robots have alike.
 
     Attributes:
-        x: Of the position along x of W [m].
-        y: Of the position along y of W [m].
-        angle: Of the object's angle [rad].
-        joints: Of every joint [rad or m].
-        velocity_x: Of every base's velocity along x of W [m/s].
-        velocity_y: Of every base's velocity along y of W [m/s].
-        turn_rate: Of every base's turn rate [rad/s].
-        joint_rates: Of every joint's rate [rad/s or m/s].
+        x: Error of the position along x of W [m].
+        y: Error of the position along y of W [m].
+        angle: Error of the object's angle [rad].
+        joints: Error of every joint [rad or m].
+        velocity_x: Error of every base's velocity along x of W [m/s].
+        velocity_y: Error of every base's velocity along y of W [m/s].
+        turn_rate: Error of every base's turn rate [rad/s].
+        joint_rates: Error of every joint's rate [rad/s or m/s].
     """
 
     x: Wave = field(default_factory=Wave)

@@ -140,9 +140,10 @@ and `Status`. It ends the run by `Goodbye`.
 - **Time** is the world's. `time` is what the robot's clock shows at the sample. In lock-step the world waits
   for all answers; by the wall clock a sample is sent no earlier than at its time.
 - **Order**: a message of the team counts from the next sample on. Every answer says how many messages its
-  sender has sent to the team. The next question says in `team_messages` how many its receiver waits for: a
-  `Sample` the number that the last `Status` had for this robot, a `Tick` those of the last `Telemetry` of
-  each robot, 0 before the first answer.
+  sender has sent to the team. The next question says in `team_messages` how many messages its
+  receiver must have before it answers. In a `Sample` this is the number that the last `Status` had for this
+  robot. In a `Tick` these are the numbers of the last `Telemetry` of each robot. Before the first answer it
+  is 0.
 - **Stamps** are the times, by the robot's clock, at which pose and state were measured: m periods before
   `time` for a delay of m periods, 0 in the first m samples. Under a budget a robot asks for a hold, and
   after {LONGEST_DOUBT:g} s lets its drives brake, if a measurement's age is wrong by more than
