@@ -31,8 +31,8 @@ class PlannerSettings:
         slice_overlap: Overlap of neighbouring slices over their width, for under-cells only.
         angle_resolution: Slices of angles are not split below this width [rad].
         length_resolution: Slices of prismatic joints are not split below this width [m].
-        max_slices: Work budget: no exploration begins once all of them have made so many slices. The last one
-            may exceed it.
+        max_slices: Work budget: no exploration begins once all of them have made so many slices. The last
+            exploration may exceed it.
         min_clearance: Least clearance of the object's path in a cell (half the passage), and of the target.
             Narrower ones take minutes. Scaled for very large or very small teams [m].
         max_transition_time: Longest estimated time of one transition that is accepted [s].
