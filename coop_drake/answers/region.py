@@ -7,7 +7,7 @@ import numpy as np
 import shapely
 from shapely import Polygon
 
-from coop_drake.geometry.parts import corners_of
+from coop_drake.geometry.polygons import corners_of
 from coop_drake.tree.pose import FloatArray
 from coop_drake.typed_data import Codec, DataError, Number
 

@@ -13,7 +13,7 @@ from coop_drake.compiled_loop.arrays import LoopCells, LoopNominal, LoopPlant, L
 from coop_drake.diagram.knowledge import arrival_goal, governed_cells, rest_tolerance, robot_knowledge
 from coop_drake.diagram.robot_controller import RobotKnowledge
 from coop_drake.errors import ScenarioError
-from coop_drake.geometry.boundary import BoundaryDistance
+from coop_drake.geometry.polygons import BoundaryDistance
 from coop_drake.harmonic_maps import HarmonicMap, VelocityField
 from coop_drake.laws.hand_over import governed_gains
 from coop_drake.plant import (

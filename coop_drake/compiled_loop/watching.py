@@ -21,7 +21,7 @@ from coop_drake.compiled_loop.arrays import (
     WatchRoom,
 )
 from coop_drake.compiled_loop.robots import heard_cell
-from coop_drake.geometry.boundary import signed_distance
+from coop_drake.geometry.polygons import signed_distance
 from coop_drake.jit import compiled
 from coop_drake.laws.axis_table import bounds_of
 from coop_drake.simulation.clearance import pair_apart, piece_to_walls, place_pieces

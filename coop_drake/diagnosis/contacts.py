@@ -14,7 +14,7 @@ from shapely.geometry.polygon import orient
 
 from coop_drake.answers import PlanningProblem
 from coop_drake.drawing import BodyFootprint, team_footprints
-from coop_drake.geometry.boundary import edges_of
+from coop_drake.geometry.polygons import edges_of
 from coop_drake.geometry.swept_tree import Interval
 from coop_drake.planning.questions import exact_footprint
 from coop_drake.tree.component_tree import ComponentTree

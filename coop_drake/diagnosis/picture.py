@@ -14,7 +14,7 @@ from coop_drake.diagnosis.diagnosing import Diagnosis
 from coop_drake.diagnosis.widening import BlockingPassage
 from coop_drake.drawing import draw_polygon, draw_workspace, new_figure, team_footprints
 from coop_drake.drawing.colours import AT_FAULT, BLUE, GREY, INK, NOT_AT_FAULT, OUTSIDE, PAPER, WALL
-from coop_drake.geometry.parts import parts_of
+from coop_drake.geometry.polygons import parts_of
 from coop_drake.tree.pose import FloatArray
 
 MOST_PLACES = 3

@@ -15,7 +15,7 @@ from shapely.geometry.base import BaseGeometry
 from coop_drake.answers import PlanningProblem
 from coop_drake.diagnosis.contacts import CollidingStretch, colliding_stretches
 from coop_drake.diagnosis.variants import Answer, BudgetedPlanner
-from coop_drake.geometry.parts import parts_of
+from coop_drake.geometry.polygons import parts_of
 from coop_drake.tree.pose import FloatArray
 
 # Wider floors: walls moved back, everywhere or around some places, but never removed.

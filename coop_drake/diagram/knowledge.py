@@ -10,7 +10,7 @@ import numpy as np
 from coop_drake.answers.plan import Plan
 from coop_drake.diagram.robot_controller import RobotKnowledge
 from coop_drake.errors import PlanError, ScenarioError
-from coop_drake.geometry.boundary import BoundaryDistance
+from coop_drake.geometry.polygons import BoundaryDistance
 from coop_drake.harmonic_maps import HarmonicMap, VelocityField
 from coop_drake.laws.arrival import ArrivalGoal
 from coop_drake.laws.departure import unseen_time

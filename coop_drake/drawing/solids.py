@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from shapely import Polygon, constrained_delaunay_triangles
 
 from coop_drake.drawing import colours
-from coop_drake.geometry.parts import parts_of
+from coop_drake.geometry.polygons import parts_of
 from coop_drake.templates import rendered
 from coop_drake.tree.pose import FloatArray
 

@@ -11,7 +11,7 @@ from coop_drake.drawing import draw_polygon, draw_workspace, legend_above, new_f
 from coop_drake.drawing.canvas import house_style
 from coop_drake.drawing.colours import FLOOR, INK, LIGHT_GREY, VERMILLION
 from coop_drake.floor_plans.plan import FloorPlan
-from coop_drake.geometry.parts import parts_of
+from coop_drake.geometry.polygons import parts_of
 
 _WIDTH = 8.0
 """Width of the figure [in]."""

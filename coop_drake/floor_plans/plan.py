@@ -19,7 +19,7 @@ from coop_drake.floor_plans.settings import FloorPlanSettings
 from coop_drake.floor_plans.shape_file import read_geojson, read_wkt
 from coop_drake.floor_plans.svg_file import read_svg
 from coop_drake.floor_plans.walls import Drawing
-from coop_drake.geometry.parts import corners_of
+from coop_drake.geometry.polygons import corners_of
 
 # The floor-plan formats that can be read: to add one, write its reader and enter it in `READERS`.
 #

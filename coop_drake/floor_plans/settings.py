@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 from shapely import Polygon
 
 from coop_drake.errors import FloorPlanError
-from coop_drake.geometry.parts import corners_of
+from coop_drake.geometry.polygons import corners_of
 from coop_drake.tree.pose import FloatArray
 from coop_drake.typed_data import DataError, Limits, check_fields
 

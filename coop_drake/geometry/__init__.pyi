@@ -4,7 +4,7 @@ from .minkowski import FreeSpace
 from .passage import Passage, PassageFinder, pole
 from .simplify import sharpest_angle, simplify_inward
 from .swept_tree import SweptTree
-from .tidy import cut_holes, tidy_cell
+from .tidy import tidy_cell
 
 __all__ = [
     "BodyPairs",
@@ -13,7 +13,6 @@ __all__ = [
     "Passage",
     "PassageFinder",
     "SweptTree",
-    "cut_holes",
     "pole",
     "sharpest_angle",
     "simplify_inward",

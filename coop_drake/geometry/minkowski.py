@@ -9,12 +9,12 @@ import numpy as np
 from manifold3d import CrossSection, FillRule
 from shapely import MultiPolygon, Polygon
 
-from coop_drake.geometry import under_kernels
-from coop_drake.geometry.convex import following
-from coop_drake.geometry.large_floors import LARGE, fitting_on_large_floor
-from coop_drake.geometry.parts import polygon_rings
-from coop_drake.geometry.safeguards import checked_buffer, second_opinion
-from coop_drake.geometry.sum_kernels import fitting_cycles
+from coop_drake.geometry.sweeps import shrunk
+from coop_drake.geometry.sweeps import following
+from coop_drake.geometry.minkowski import LARGE, fitting_on_large_floor
+from coop_drake.geometry.polygons import polygon_rings
+from coop_drake.geometry.minkowski import checked_buffer, second_opinion
+from coop_drake.geometry.minkowski import fitting_cycles
 from coop_drake.tree.pose import FloatArray
 
 SAFE_SIDE = 1e-6
@@ -82,10 +82,10 @@ class FreeSpace:
     def minus(self, footprint: FloatArray) -> CrossSection:
         """Positions p with p + F inside the workspace; F is convex, counter-clockwise, shape (n, 2) [m]."""
         if self._grown is not None:
-            shrunk = under_kernels.shrunk(footprint, SAFE_SIDE)
-            if len(shrunk) == 0:
+            smaller = shrunk(footprint, SAFE_SIDE)
+            if len(smaller) == 0:
                 return self._grown.minus(footprint)
-            footprint = shrunk
+            footprint = smaller
         try:
             found: CrossSection | None = self._clipped(footprint)
         except (RuntimeError, ValueError):

@@ -13,9 +13,9 @@ from numpy.typing import ArrayLike
 from shapely import LineString, Polygon
 
 from coop_drake.errors import GeometryError
-from coop_drake.geometry.boundary import BoundaryDistance, edges_of
-from coop_drake.geometry.edge_pieces import IndexArray, cut_edges
-from coop_drake.geometry.triangles import triangulate
+from coop_drake.geometry.polygons import BoundaryDistance, edges_of
+from coop_drake.geometry.passage import IndexArray, cut_edges
+from coop_drake.geometry.passage import triangulate
 from coop_drake.jit import compiled
 from coop_drake.tree.pose import FloatArray, IntArray
 

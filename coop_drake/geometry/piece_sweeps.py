@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from math import cos, sin
 
-from coop_drake.geometry.sweep_kernels import disc_turn, grown, over_prismatic, over_revolute
+from coop_drake.geometry.sweeps import disc_turn, grown, over_prismatic, over_revolute
 from coop_drake.jit import compiled
 from coop_drake.tree.pose import FloatArray
 from coop_drake.tree.team_arrays import TeamArrays, moved

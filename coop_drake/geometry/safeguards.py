@@ -10,8 +10,8 @@ from shapely import MultiPolygon, Polygon
 from shapely.errors import ShapelyError
 from shapely.geometry.base import BaseGeometry
 
-from coop_drake.geometry.large_floors import common
-from coop_drake.geometry.parts import polygon_rings
+from coop_drake.geometry.minkowski import common
+from coop_drake.geometry.polygons import polygon_rings
 from coop_drake.tree.pose import FloatArray
 
 _FAILURES = (RuntimeError, ValueError, ArithmeticError)

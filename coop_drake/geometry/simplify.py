@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from shapely import Polygon
 
 from coop_drake.geometry.distances import segments_cross, squared_distance, twice_area
-from coop_drake.geometry.edge_pieces import IndexArray
-from coop_drake.geometry.parts import corners_of
+from coop_drake.geometry.passage import IndexArray
+from coop_drake.geometry.polygons import corners_of
 from coop_drake.jit import compiled
 from coop_drake.tree.pose import FloatArray
 

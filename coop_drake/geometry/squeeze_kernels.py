@@ -7,7 +7,7 @@ from math import cos, hypot, sin
 import numpy as np
 
 from coop_drake.geometry.distances import squared_distance
-from coop_drake.geometry.sweep_kernels import edge_directions, support
+from coop_drake.geometry.sweeps import edge_directions, support
 from coop_drake.jit import compiled
 from coop_drake.tree.pose import FloatArray
 

@@ -9,7 +9,7 @@ from math import atan2, ceil, cos, floor, hypot, pi, sin, sqrt
 
 import numpy as np
 
-from coop_drake.geometry.convex import SLACK
+from coop_drake.geometry.sweeps import SLACK
 from coop_drake.jit import compiled
 from coop_drake.tree.pose import FloatArray
 

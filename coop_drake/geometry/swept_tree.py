@@ -11,10 +11,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from coop_drake.geometry.convex import normals
-from coop_drake.geometry.piece_sweeps import over_piece
-from coop_drake.geometry.sweep_kernels import closed_directions, disc_turn, edge_directions
-from coop_drake.geometry.under_kernels import common_disc, under_prismatic, under_revolute
+from coop_drake.geometry.sweeps import normals
+from coop_drake.geometry.sweeps import over_piece
+from coop_drake.geometry.sweeps import closed_directions, disc_turn, edge_directions
+from coop_drake.geometry.sweeps import common_disc, under_prismatic, under_revolute
 from coop_drake.tree.component_tree import ComponentTree, ConvexShape, TreeJoint
 from coop_drake.tree.pose import FloatArray
 from coop_drake.tree.team_arrays import TeamArrays

@@ -8,9 +8,9 @@ import numpy as np
 import shapely
 from shapely import Polygon
 
-from coop_drake.geometry.boundary import edges_of
-from coop_drake.geometry.edge_pieces import IndexArray, cut_edges
-from coop_drake.geometry.parts import extent_of
+from coop_drake.geometry.polygons import edges_of
+from coop_drake.geometry.passage import IndexArray, cut_edges
+from coop_drake.geometry.polygons import extent_of
 from coop_drake.tree.pose import FloatArray
 
 PIECES_PER_GAP = 1.0

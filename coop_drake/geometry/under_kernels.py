@@ -6,8 +6,8 @@ from math import cos, floor, pi, sin, sqrt
 
 import numpy as np
 
-from coop_drake.geometry.convex import SLACK
-from coop_drake.geometry.sweep_kernels import arc_parts, closed_directions, edge_directions, support
+from coop_drake.geometry.sweeps import SLACK
+from coop_drake.geometry.sweeps import arc_parts, closed_directions, edge_directions, support
 from coop_drake.jit import compiled
 from coop_drake.tree.pose import FloatArray
 

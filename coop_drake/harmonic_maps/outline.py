@@ -12,7 +12,7 @@ from shapely import Point, Polygon
 from shapely.geometry.base import BaseGeometry
 
 from coop_drake.errors import FieldError, UnmappableError
-from coop_drake.geometry.parts import corners_of, extent_of
+from coop_drake.geometry.polygons import corners_of, extent_of
 from coop_drake.geometry.simplify import sharpest_angle, simplify_inward
 from coop_drake.tree.pose import ComplexArray, FloatArray, IntArray
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from math import ceil
+from typing import NamedTuple
 
 import numpy as np
 from shapely import Polygon
@@ -14,12 +15,15 @@ from coop_drake.answers.digest import problem_digest
 from coop_drake.answers.plan import Plan
 from coop_drake.answers.problem import PlanningProblem
 from coop_drake.errors import GeometryError, PlanError, StallError, TooQuickError
-from coop_drake.geometry.body_pairs import BodyPairs
+from coop_drake.geometry.swept_tree import BodyPairs
 from coop_drake.geometry.swept_tree import SweptTree
+from coop_drake.jit import compiled
 from coop_drake.laws import GainSet
-from coop_drake.laws.gain_schedule import schedule_of
-from coop_drake.planning.box_choice import Waypoints, choose_boxes
-from coop_drake.planning.boxes import BoxArrays, box_arrays, longest_box
+from coop_drake.laws.funnels import CLOSING
+from coop_drake.laws.gain_schedule import Schedule, schedule_of, scheduled_axis, scheduled_governor
+from coop_drake.laws.governor import FIELD_SPEED, steady_clearance
+from coop_drake.laws.readiness import interval_margin
+from coop_drake.planning.boxes import BoxArrays, box_arrays, clearances_in_box, longest_box
 from coop_drake.planning.cells.cells import FreeBox
 from coop_drake.planning.channel import Channel, CoveredPath, Regions
 from coop_drake.planning.duration import estimated, plan_time, timed
@@ -38,8 +42,9 @@ from coop_drake.planning.transitions import (
     with_gains,
 )
 from coop_drake.progress import Progress
-from coop_drake.tree.component_tree import nearest_turn, usual_unit
-from coop_drake.tree.pose import FloatArray
+from coop_drake.tree.component_tree import nearest_turn
+from coop_drake.tree.component_tree import usual_unit
+from coop_drake.tree.pose import FloatArray, IntArray
 
 
 def quickest_plan(
@@ -166,6 +171,29 @@ CORE_FRACTION = 0.9
 """Fraction of the waypoints' clearance that cores keep, so that waypoints lie inside them [-]."""
 
 
+BOX_COST = 9e-4
+"""Every box costs this over its padding besides its time [rad s]: fewer boxes are better if the times are
+equal, and narrow funnels leave little tolerance for what the closed form leaves out."""
+
+K = [0.75, 0.25, 0.0, 9e-4, 0.0, 1.0, 0.0]
+
+DENSE_ENDS, SPARSE_STEP = 8, 3
+"""Each of the first eight waypoints of a box is tried as its end; after them only every third one is."""
+
+LARGEST_CLEARANCE = 1.0
+"""Larger clearances count as this one [m]: the object has reached its highest speed."""
+
+NARROWEST = 1e-4
+"""A box narrower than this counts as this wide where gains are scheduled [m], so that K stays finite."""
+
+CLOSED = 0.75
+"""An axis outside its goal interval reaches it in this part of the time in which its funnel closes [-]."""
+
+LEAVING_EROSION = 0.25
+"""Fraction of a goal interval, at each end, in which an axis does not leave a box [-]. It is larger than
+that of the closed loop: near an end the next funnel, which is not known yet, could not be entered."""
+
+
 @dataclass(frozen=True)
 class PathCovering:
     """Boxes along a path, and the points at which each of them is left.
@@ -189,7 +217,7 @@ def cover_path(
 ) -> PathCovering | None:
     """Cover a path with boxes such that the transport is fast: few boxes, and narrow ones in narrow passages.
 
-    The boxes are chosen by a compiled simulation of the closed loop. Every box is then proved free as in the
+    The boxes are chosen by their times in closed form, see ``choose_boxes``. Every box is then proved free as in the
     search, by over-sweeps and Minkowski differences at margin zero; a box that is not proved is not used.
 
     Args:
@@ -222,7 +250,7 @@ def cover_path(
         places = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points[:, :2], axis=0).T))])
         waypoints = Waypoints(
             boxes, grid, points, places, np.array(pads), goals, schedule_of(gain_set), limits,
-            least_clearance, problem.position_tolerance,
+            least_clearance, np.array(K),
         )  # fmt: skip
         found = _fastest_boxes(waypoints, Regions(problem, swept, pairs, CORE_FRACTION * least_clearance))
         if found is not None:
@@ -278,7 +306,7 @@ def _waypoints(
 
 def _fastest_boxes(waypoints: Waypoints, regions: Regions) -> tuple[list[FreeBox], list[int]] | None:
     """The fastest boxes, and the waypoint at which each of them ends; None if one is not proved free."""
-    _, rows = choose_boxes(waypoints)
+    rows = choose_boxes(waypoints)
     boxes = [_proved(waypoints, regions, first, last, pad) for first, last, pad in rows]
     proved = [box for box in boxes if box is not None]
     return (proved, rows[:, 1].tolist()) if 0 < len(proved) == len(rows) else None
@@ -290,3 +318,148 @@ def _proved(waypoints: Waypoints, regions: Regions, first: int, last: int, pad: 
     lower = np.maximum(waypoints.boxes.lower, part[:, 2:].min(axis=0) - width)
     upper = np.minimum(waypoints.boxes.upper, part[:, 2:].max(axis=0) + width)
     return regions.around(FreeBox(Polygon(), Polygon(), lower, upper, part[:, :2].copy()))
+
+
+# The choice of boxes: a dynamic programme over waypoints, with the time of a box in closed form.
+
+
+class Waypoints(NamedTuple):
+    """Waypoints of a path, and the data with which boxes along them are tried.
+
+    Attributes:
+        boxes: The team.
+        grid: The floor.
+        path: Waypoints z, circular axes unwrapped, shape (n, 3 + joints) [m, rad].
+        places: Where they lie along the path, shape (n,) [m].
+        pads: Paddings of a box to choose from, shape (p,) [rad or m].
+        goals: Lower and upper ends of the last goal intervals, shape (2, m) [rad, m].
+        schedule: The rules by which gains are chosen.
+        limits: Largest speed of the object, then largest rates of all axes, shape (1 + m,) [m/s, rad/s].
+        least_clearance: Clearance that every waypoint must keep [m].
+    """
+
+    boxes: BoxArrays
+    grid: ObstacleGrid
+    path: FloatArray
+    places: FloatArray
+    pads: FloatArray
+    goals: FloatArray
+    schedule: Schedule
+    limits: FloatArray
+    least_clearance: float
+    k: FloatArray
+
+
+@compiled
+def choose_boxes(waypoints: Waypoints) -> IntArray:
+    """Choose the boxes along waypoints that are crossed in the shortest time.
+
+    Each box holds some consecutive waypoints, padded by one of a few widths. For every waypoint and every
+    width of the next box, the quickest sequence of boxes that ends there is kept: its time is that of the
+    sequence to where its last box begins, plus the time of that box, the longer one of those of the object
+    and of the axes. A box is swept only if it may be quicker than what is known; the object's time in it is
+    not shorter than in the same box that ends before.
+
+    Args:
+        waypoints: The waypoints.
+
+    Returns:
+        For each box a row (first waypoint, last waypoint, index of the padding); none if there is no
+        sequence.
+    """
+    n, count, m = len(waypoints.path), len(waypoints.pads), waypoints.path.shape[1] - 2
+    time, before = np.full((n, count), np.inf), np.zeros((n, count, 2), np.int64)
+    time[0] = 0.0
+    least, most = waypoints.path[:, 2:].copy(), waypoints.path[:, 2:].copy()
+    travel = np.zeros((n, count))  # The object's time in the longest box that was swept; infinite if too long.
+    lower, upper, goals = np.empty(m), np.empty(m), np.empty((2, m))
+    for j in range(1, n):
+        nexts = 1 if j + 1 == n else count
+        for i in range(j):
+            for a in range(m):
+                least[i, a] = min(least[i, a], waypoints.path[j, 2 + a])
+                most[i, a] = max(most[i, a], waypoints.path[j, 2 + a])
+            if j - i > DENSE_ENDS and (j - i) % SPARSE_STEP != 0 and j + 1 < n:
+                continue
+            for p in range(count):
+                begun = time[i, p] + waypoints.k[3] / waypoints.pads[p] + waypoints.k[2]
+                if not begun + travel[i, p] < time[j, :nexts].max():
+                    continue
+                for a in range(m):
+                    lower[a] = max(waypoints.boxes.lower[a], least[i, a] - waypoints.pads[p])
+                    upper[a] = min(waypoints.boxes.upper[a], most[i, a] + waypoints.pads[p])
+                clearances = clearances_in_box(
+                    waypoints.boxes, waypoints.grid, lower, upper, waypoints.path, i, j, LARGEST_CLEARANCE
+                )
+                if len(clearances) == 0 or clearances.min() < waypoints.least_clearance:
+                    travel[i, p] = np.inf
+                    continue
+                travel[i, p] = _travel(waypoints, i, j, clearances)
+                for q in range(nexts):
+                    for a in range(m):
+                        if j + 1 == n:
+                            low, high = waypoints.goals[0, a], waypoints.goals[1, a]
+                        else:
+                            low = waypoints.path[j, 2 + a] - waypoints.pads[q]
+                            high = waypoints.path[j, 2 + a] + waypoints.pads[q]
+                        goals[0, a], goals[1, a] = max(lower[a], low), min(upper[a], high)
+                    tc = _closing(waypoints, i, lower, upper, goals)
+                    reached = begun + max(travel[i, p], tc) + waypoints.k[4] * min(travel[i, p], tc)
+                    if reached < time[j, q]:
+                        time[j, q] = reached
+                        before[j, q, 0], before[j, q, 1] = i, p
+    rows = np.empty((n, 3), np.int64)
+    j, q, first = n - 1, 0, n
+    while j > 0 and time[n - 1, 0] < np.inf:
+        first -= 1
+        rows[first, 0], rows[first, 1], rows[first, 2] = before[j, q, 0], j, before[j, q, 1]
+        j, q = before[j, q, 0], before[j, q, 1]
+    return rows[first:]
+
+
+@compiled
+def _travel(waypoints: Waypoints, i: int, j: int, clearances: FloatArray) -> float:
+    """Time in which the object passes a box at the governor's steady speed, from waypoint i to j [s].
+
+    Args:
+        waypoints: The waypoints.
+        i: The first waypoint.
+        j: The last one.
+        clearances: Clearance at the waypoints in the box, shape (j - i + 1,) [m].
+    """
+    stiffness, damping, gain = scheduled_governor(waypoints.schedule, max(clearances.min(), NARROWEST))
+    per_speed = steady_clearance(1.0, stiffness, damping, gain)
+    fastest, seconds = min(gain * FIELD_SPEED, waypoints.limits[0]), 0.0
+    for k in range(j - i):
+        clearance = 0.5 * (clearances[k] + clearances[k + 1])
+        length = waypoints.places[i + k + 1] - waypoints.places[i + k]
+        seconds += length / min(waypoints.k[5] * clearance / per_speed, fastest)
+    return seconds
+
+
+@compiled
+def _closing(
+    waypoints: Waypoints, i: int, lower: FloatArray, upper: FloatArray, goals: FloatArray
+) -> float:
+    """Time in which the axes reach their goal intervals, most of the time that their funnels close in [s].
+
+    Args:
+        waypoints: The waypoints.
+        i: The waypoint at which the box is entered.
+        lower: Lower ends of the slice, shape (m,) [rad or m].
+        upper: Upper ends, shape (m,).
+        goals: Lower and upper ends of the goal intervals, shape (2, m).
+    """
+    longest, narrowest = waypoints.schedule.hand_over_time, np.inf
+    for a in range(1, len(lower)):
+        narrowest = min(narrowest, goals[1, a] - goals[0, a])
+    for a in range(len(lower)):
+        resting = waypoints.path[i, 2 + a]
+        if interval_margin(resting, goals[0, a], goals[1, a], waypoints.k[1]) >= 0.0:
+            continue
+        rate = scheduled_axis(
+            waypoints.schedule, a > 0, lower[a], upper[a], goals[0, a], goals[1, a], resting, narrowest,
+            waypoints.limits[1 + a], np.inf,
+        )[0]  # fmt: skip
+        longest = max(longest, waypoints.k[0] * CLOSING / rate)
+    return longest

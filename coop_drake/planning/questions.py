@@ -16,10 +16,10 @@ from shapely.geometry.base import BaseGeometry
 from coop_drake.answers.limits import TeamLimits
 from coop_drake.answers.problem import ROUNDING, PlanningProblem, at_goal, goal_box
 from coop_drake.errors import GeometryError, PlanError
-from coop_drake.geometry import safeguards
-from coop_drake.geometry.convex import normals
+from coop_drake.geometry.minkowski import components
+from coop_drake.geometry.sweeps import normals
 from coop_drake.geometry.minkowski import FreeSpace, to_polygon
-from coop_drake.geometry.parts import parts_of, polygon_rings
+from coop_drake.geometry.polygons import parts_of, polygon_rings
 from coop_drake.tree.component_tree import Component, ComponentTree, TreeJoint, nearest_turn
 from coop_drake.tree.pose import FloatArray
 
@@ -144,7 +144,7 @@ def shrunk(workspace: Polygon, margin: float) -> MultiPolygon:
     if margin <= 0.0:
         return MultiPolygon([workspace])
     section = FreeSpace(polygon_rings(workspace)).minus(disc_polygon(margin))
-    parts = safeguards.components(section, over=False)
+    parts = components(section, over=False)
     if not (parts or section.is_empty()):
         raise GeometryError(f"the floor at a margin of {margin} m cannot be parted")
     return MultiPolygon([to_polygon(part) for part in parts])

@@ -6,7 +6,7 @@ import dataclasses
 from pathlib import Path
 
 from coop_drake.errors import ScenarioError
-from coop_drake.geometry.parts import corners_of
+from coop_drake.geometry.polygons import corners_of
 from coop_drake.laws.gains import GainSet
 from coop_drake.scenario.document import read_file, write
 from coop_drake.scenario.model import Gains, Scenario, Workspace

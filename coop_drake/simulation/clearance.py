@@ -13,7 +13,7 @@ import numpy as np
 from shapely import Polygon
 
 from coop_drake.errors import GeometryError
-from coop_drake.geometry.boundary import edges_of, signed_distance
+from coop_drake.geometry.polygons import edges_of, signed_distance
 from coop_drake.geometry.distances import meets_ring, ring_holds, squared_distance, squared_ring_distance
 from coop_drake.jit import compiled
 from coop_drake.tree.component_tree import ComponentTree

@@ -16,7 +16,7 @@ from pydrake.systems.framework import Context
 from coop_drake.answers.log import SimulationLog
 from coop_drake.answers.plan import Plan
 from coop_drake.diagram.station import Loop, Places, PortRow
-from coop_drake.geometry.boundary import BoundaryDistance, signed_distance
+from coop_drake.geometry.polygons import BoundaryDistance, signed_distance
 from coop_drake.jit import compiled
 from coop_drake.laws import total_wrench
 from coop_drake.simulation.clearance import TeamClearance, team_distances

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from coop_drake.geometry.boundary import signed_distance
+from coop_drake.geometry.polygons import signed_distance
 from coop_drake.harmonic_maps.field import velocity_in_field
 from coop_drake.jit import compiled
 from coop_drake.laws.governor import energy_margin, governor_velocity, tracking_energy

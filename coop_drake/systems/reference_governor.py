@@ -8,7 +8,7 @@ from functools import cached_property, partial
 
 from pydrake.systems.framework import BasicVector, Context
 
-from coop_drake.geometry.boundary import BoundaryDistance
+from coop_drake.geometry.polygons import BoundaryDistance
 from coop_drake.harmonic_maps import VelocityField
 from coop_drake.laws.gains import TransitionGains
 from coop_drake.laws.governor import driving_margin, governor_velocity, steady_clearance

@@ -52,7 +52,7 @@ from coop_drake.drawing.solids import (
     slab_mesh,
     wall_polygons,
 )
-from coop_drake.geometry.parts import component_at, parts_of
+from coop_drake.geometry.polygons import component_at, parts_of
 from coop_drake.plant import TeamPlant, build_team_plant, read_component_tree, set_configuration
 from coop_drake.plant.parsing import bodies_of
 from coop_drake.scenario import Scenario

@@ -27,7 +27,7 @@ from coop_drake.drawing.canvas import save_figure
 from coop_drake.drawing.colours import PAPER
 from coop_drake.drawing.floor import draw_polygon, draw_team, draw_workspace, outline_of
 from coop_drake.files import write_atomically
-from coop_drake.geometry.parts import parts_of
+from coop_drake.geometry.polygons import parts_of
 from coop_drake.geometry.swept_tree import Interval, Intervals
 from coop_drake.planning.cells.graph import Kind
 from coop_drake.progress import Progress

@@ -37,7 +37,7 @@ from coop_drake.drawing.solids import (
     wall_polygons,
 )
 from coop_drake.files import write_atomically
-from coop_drake.geometry.parts import parts_of
+from coop_drake.geometry.polygons import parts_of
 from coop_drake.geometry.swept_tree import Interval
 from coop_drake.planning.cells.graph import Kind
 from coop_drake.tree.pose import FloatArray

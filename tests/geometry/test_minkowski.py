@@ -6,9 +6,9 @@ from shapely import MultiPoint, MultiPolygon, Polygon, box, union_all
 from shapely.affinity import translate
 
 from coop_drake.geometry import large_floors, minkowski
-from coop_drake.geometry.large_floors import common
+from coop_drake.geometry.minkowski import common
 from coop_drake.geometry.minkowski import SAFE_SIDE, FreeSpace, to_polygon
-from coop_drake.geometry.parts import polygon_rings
+from coop_drake.geometry.polygons import polygon_rings
 from tests.support.trees import room
 
 POINTS = st.lists(st.tuples(st.floats(-0.6, 0.6), st.floats(-0.6, 0.6)), min_size=3, max_size=9)

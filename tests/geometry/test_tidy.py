@@ -8,7 +8,7 @@ from shapely import Point, Polygon, box
 
 from coop_drake.errors import GeometryError
 from coop_drake.geometry import BoundaryDistance, PassageFinder, sharpest_angle, tidy_cell
-from coop_drake.geometry.tidy import _route, _serves
+from coop_drake.geometry.simplify import _route, _serves
 from tests.support.channels import untidy_cell
 from tests.support.shapes import floors_with_ends
 

@@ -6,7 +6,7 @@ import shapely
 from hypothesis import given, settings
 from shapely import box
 
-from coop_drake.geometry.triangles import triangulate
+from coop_drake.geometry.passage import triangulate
 from tests.support.shapes import floors_with_ends
 
 HALL = box(0, 0, 6, 4)

@@ -5,7 +5,7 @@ import pytest
 import shapely
 from shapely import LineString, MultiPolygon, Point, Polygon, box
 
-from coop_drake.geometry.parts import polygon_rings
+from coop_drake.geometry.polygons import polygon_rings
 from coop_drake.planning.questions import nearby
 from coop_drake.planning.sampling.collision import ObstacleGrid, lay_grid, square_at
 from tests.support.cases import warehouse

@@ -17,7 +17,7 @@ from coop_drake.compiled_loop.loop import update
 from coop_drake.compiled_loop.running import departures_of, memory_of
 from coop_drake.compiled_loop.watching import begin_figures, watch
 from coop_drake.diagram import build_closed_loop
-from coop_drake.geometry.boundary import edges_of
+from coop_drake.geometry.polygons import edges_of
 from coop_drake.laws import ScheduledGains
 from coop_drake.laws.axis_table import axis_table
 from coop_drake.laws.gain_schedule import schedule_of

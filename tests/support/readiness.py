@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from shapely import box
 
-from coop_drake.geometry.boundary import edges_of
+from coop_drake.geometry.polygons import edges_of
 from coop_drake.systems.ready_kernels import robot_ready
 
 

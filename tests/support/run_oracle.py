@@ -14,7 +14,7 @@ from pydrake.systems.framework import DiagramBuilder
 
 from coop_drake.answers.log import SimulationLog
 from coop_drake.answers.plan import Plan
-from coop_drake.geometry.boundary import BoundaryDistance
+from coop_drake.geometry.polygons import BoundaryDistance
 from coop_drake.laws import funnel_bounds, total_wrench
 from coop_drake.laws.axis_table import axis_table
 from coop_drake.laws.hand_over import governed_gains

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from coop_drake.geometry.boundary import BoundaryDistance
+from coop_drake.geometry.polygons import BoundaryDistance
 from coop_drake.systems import GovernedCell, ReadyMonitor, axis_laws
 from coop_drake.systems.ready_kernels import ready_conditions
 from tests.support.readiness import margin_of

@@ -3,7 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from coop_drake.geometry.boundary import BoundaryDistance
+from coop_drake.geometry.polygons import BoundaryDistance
 from coop_drake.laws import governed_acceleration, governor_velocity
 from coop_drake.laws.governor import object_energy_margin
 from coop_drake.systems import GovernedCell, ReferenceGovernor

@@ -13,11 +13,11 @@ from manifold3d import CrossSection
 from shapely import MultiPolygon, Polygon
 
 from coop_drake.answers.problem import PlanningProblem, goal_box
-from coop_drake.geometry.body_pairs import BodyPair, BodyPairs
-from coop_drake.geometry.boundary import BoundaryDistance
-from coop_drake.geometry.convex import following, normals
+from coop_drake.geometry.swept_tree import BodyPair, BodyPairs
+from coop_drake.geometry.polygons import BoundaryDistance
+from coop_drake.geometry.sweeps import following, normals
 from coop_drake.geometry.minkowski import FreeSpace, to_polygon
-from coop_drake.geometry.safeguards import components, meet, shared
+from coop_drake.geometry.minkowski import components, meet, shared
 from coop_drake.geometry.squeeze_kernels import convex_hull, squeezed
 from coop_drake.geometry.swept_tree import Intervals, SweptTree
 from coop_drake.tree.component_tree import nearest_turn

@@ -12,7 +12,7 @@ from shapely import MultiPolygon, Polygon
 
 from coop_drake.answers.plan import MixedCell
 from coop_drake.answers.problem import PlanningProblem, goal_box
-from coop_drake.geometry.body_pairs import BodyPairs
+from coop_drake.geometry.swept_tree import BodyPairs
 from coop_drake.geometry.minkowski import to_polygon
 from coop_drake.geometry.swept_tree import Intervals, SweptTree
 from coop_drake.planning.cells.cells import CellMaker, FreeBox, Region, end_in

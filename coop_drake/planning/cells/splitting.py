@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from coop_drake.answers.problem import PlanningProblem, goal_box
-from coop_drake.geometry.safeguards import shared
+from coop_drake.geometry.minkowski import shared
 from coop_drake.geometry.swept_tree import Intervals
 from coop_drake.planning.cells.cells import CellMaker, Region
 from coop_drake.planning.cells.graph import GraphCell, Kind
