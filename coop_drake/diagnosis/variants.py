@@ -10,8 +10,7 @@ from shapely import box
 
 from coop_drake.answers import PlanningProblem
 from coop_drake.errors import GeometryError, PlanError
-from coop_drake.geometry.swept_tree import BodyPairs
-from coop_drake.geometry.swept_tree import SweptTree
+from coop_drake.geometry.swept_tree import BodyPairs, SweptTree
 from coop_drake.planning.boxes import Certifier
 from coop_drake.planning.cells.exploration import Verdict
 from coop_drake.planning.channel import ended, make_channel

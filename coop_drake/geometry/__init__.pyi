@@ -1,10 +1,8 @@
-from .body_pairs import BodyPairs
-from .boundary import BoundaryDistance
 from .minkowski import FreeSpace
 from .passage import Passage, PassageFinder, pole
-from .simplify import sharpest_angle, simplify_inward
-from .swept_tree import SweptTree
-from .tidy import tidy_cell
+from .polygons import BoundaryDistance
+from .simplify import sharpest_angle, simplify_inward, tidy_cell
+from .swept_tree import BodyPairs, SweptTree
 
 __all__ = [
     "BodyPairs",

@@ -4,18 +4,254 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import pairwise
+from math import cos, radians, sin
 
 import numpy as np
-from manifold3d import CrossSection, FillRule
+import shapely
+from manifold3d import CrossSection, FillRule, OpType
 from shapely import MultiPolygon, Polygon
+from shapely.errors import ShapelyError
+from shapely.geometry.base import BaseGeometry
 
-from coop_drake.geometry.sweeps import shrunk
-from coop_drake.geometry.sweeps import following
-from coop_drake.geometry.minkowski import LARGE, fitting_on_large_floor
 from coop_drake.geometry.polygons import polygon_rings
-from coop_drake.geometry.minkowski import checked_buffer, second_opinion
-from coop_drake.geometry.minkowski import fitting_cycles
-from coop_drake.tree.pose import FloatArray
+from coop_drake.geometry.sweeps import following, shrunk
+from coop_drake.jit import compiled
+from coop_drake.tree.pose import FloatArray, IntArray
+
+# Replacements for results of geometry libraries that fail; they never prove a position free or blocked.
+
+_FAILURES = (RuntimeError, ValueError, ArithmeticError)
+_ROUNDING = 1e-6
+"""Areas that should be equal may differ by this fraction [-]: more than rounding, less than a failure."""
+
+
+def shared(first: CrossSection, second: CrossSection, *, over: bool) -> CrossSection:
+    """Intersection of two regions; where clipping fails, the smaller over-region or the empty under-region.
+
+    Of an over-region what is left out is called blocked, of another one what is kept is called free.
+    """
+    smaller = min(first, second, key=CrossSection.area)
+    try:
+        found = common(first, second)
+        if found.area() <= (1.0 + _ROUNDING) * smaller.area():
+            return found
+    except _FAILURES:
+        pass
+    return smaller if over else CrossSection()
+
+
+def components(section: CrossSection, *, over: bool) -> list[CrossSection]:
+    """Connected parts of a region; if decomposing fails, the whole region if ``over``, otherwise none."""
+    if section.is_empty():
+        return []
+    try:
+        parts = [part for part in section.decompose() if not part.is_empty()]
+        if abs(sum(part.area() for part in parts) - section.area()) <= _ROUNDING * section.area():
+            return parts
+    except _FAILURES:
+        pass
+    return [section] if over else []
+
+
+def meet(first: CrossSection, second: CrossSection, *, otherwise: bool) -> bool:
+    """Whether two regions share more than their boundary; ``otherwise`` where clipping fails."""
+    try:
+        return not common(first, second).is_empty()
+    except _FAILURES:
+        return otherwise
+
+
+def checked_buffer(workspace: Polygon | MultiPolygon, distance: float) -> Polygon | MultiPolygon:
+    """W, grown or shrunk where the distance is negative [m]; if that fails, its bounding box, or nothing."""
+    try:
+        result = workspace.buffer(distance, join_style="mitre")
+        nested = result.covers(workspace) if distance > 0.0 else workspace.covers(result)
+    except ShapelyError:
+        nested = False
+    if nested and isinstance(result, Polygon | MultiPolygon):
+        return result
+    if distance < 0.0 or workspace.is_empty:
+        return Polygon()
+    x_min, y_min, x_max, y_max = workspace.bounds
+    return shapely.box(x_min - distance, y_min - distance, x_max + distance, y_max + distance)
+
+
+def second_opinion(rings: Sequence[FloatArray], edges: FloatArray, footprint: FloatArray) -> list[FloatArray]:
+    """Positions p with p + F inside a floor by GEOS, or a box around all of them where GEOS fails, too.
+
+    Args:
+        rings: The floor's rings, shape (n, 2) each [m].
+        edges: All their edges, shape (E, 2, 2) [m].
+        footprint: Convex polygon F relative to p, shape (n, 2) [m].
+
+    Returns:
+        Rings, outer ones counter-clockwise, holes clockwise.
+    """
+    if not rings:
+        return []
+    start = footprint[0]
+    try:
+        floor: BaseGeometry = Polygon()
+        for ring in rings:
+            floor = shapely.symmetric_difference(floor, Polygon(ring))
+        sums = (edges[:, :, None, :] - footprint).reshape(len(edges), -1, 2)
+        walls = shapely.union_all(shapely.convex_hull(shapely.linestrings(sums)))
+        return polygon_rings(shapely.transform(floor, lambda points: points - start).difference(walls))
+    except (ShapelyError, ValueError):
+        corners = edges.reshape(-1, 2) - start
+        return polygon_rings(shapely.box(*corners.min(axis=0), *corners.max(axis=0)))
+
+
+# The Minkowski difference of eq. (9) and intersections on floors with very many corners.
+#
+# The clipping library sweeps a line over the plane and looks for the place of every corner among all edges
+# that the line meets, one by one: where a horizontal wall has tens of thousands of corners, the time grows
+# with their square. Here the plane is turned first, so that walls that are parallel to the axes, as most
+# long ones are, meet the line in few places.
+
+LARGE = 10_000
+"""Number of corners from which on the plane is turned [-]: below, it saves less than a tenth of a second."""
+
+_PLANE_TURN = 29.3
+"""How far the plane is turned [degrees]: away from all multiples of 15, at which walls are likely."""
+
+_EDGES, _PARTS = 8, 4
+"""How many edges are united at once at first, and how many unions of neighbours later: few overlap."""
+
+
+def common(first: CrossSection, second: CrossSection) -> CrossSection:
+    """Intersection of two regions."""
+    if first.num_vert() + second.num_vert() < LARGE:
+        return first ^ second
+    return (first.rotate(_PLANE_TURN) ^ second.rotate(_PLANE_TURN)).rotate(-_PLANE_TURN)
+
+
+def fitting_on_large_floor(
+    rings: Sequence[FloatArray], edges: FloatArray, footprint: FloatArray
+) -> CrossSection:
+    """Positions p with p + F inside a floor: where F's first vertex is inside and F meets no wall.
+
+    Neighbouring edges are united first: their sums with -F overlap so much that all at once would cross in as
+    many places as there are pairs of edges within a footprint.
+
+    Args:
+        rings: The floor's rings, outer ones counter-clockwise, holes clockwise, shape (n, 2) each [m].
+        edges: All their edges (x0, y0, x1, y1) in order, shape (E, 4) [m].
+        footprint: Convex ring F, shape (n, 2) [m].
+    """
+    sums = _turned(edges.reshape(-1, 2, 1, 2) - footprint).reshape(len(edges), -1, 2)
+    corners, owner = shapely.get_coordinates(
+        shapely.convex_hull(shapely.linestrings(sums)), return_index=True
+    )
+    bounds = [0, *(np.flatnonzero(np.diff(owner)) + 1).tolist(), len(corners)]
+    hulls = [corners[a : b - 1] for a, b in pairwise(bounds)]
+    walls = [CrossSection(hulls[k : k + _EDGES], FillRule.NonZero) for k in range(0, len(hulls), _EDGES)]
+    while len(walls) > 1:
+        walls = [
+            CrossSection.batch_boolean(walls[k : k + _PARTS], OpType.Add)
+            for k in range(0, len(walls), _PARTS)
+        ]
+    floor = CrossSection([_turned(ring - footprint[0]) for ring in rings], FillRule.Positive)
+    return (floor - walls[0]).rotate(-_PLANE_TURN)
+
+
+def _turned(points: FloatArray) -> FloatArray:
+    """Points, shape (..., 2), in the turned plane."""
+    c, s = cos(radians(_PLANE_TURN)), sin(radians(_PLANE_TURN))
+    turned: FloatArray = points @ np.array([[c, s], [-s, c]])
+    return turned
+
+
+# Compiled cycles that wind once around the positions at which a convex footprint fits between walls.
+
+_NEEDLE = 1e-12
+"""A corner whose edges turn back with a smaller sine than this is a needle [-]: rounding decides its side."""
+
+
+@compiled
+def fitting_cycles(
+    points: FloatArray, first: IntArray, extents: FloatArray, convex: FloatArray
+) -> tuple[FloatArray, IntArray]:
+    """Trace every ring with the footprint's vertex that lies furthest out: the reduced convolution with -F.
+
+    Along an edge the vertex v furthest beyond it draws the edge, shifted by -v. Where the floor is not
+    convex the vertices in between follow one by one, clockwise; where it is convex the ends are joined, for
+    whatever else the full convolution would draw there lies where the corner is inside the footprint.
+
+    Args:
+        points: Vertices of all rings, outer ones counter-clockwise, holes clockwise, none twice in a row,
+            shape (E, 2) [m].
+        first: Where each ring begins, shape (R + 1,).
+        extents: Widths in x and y of what a ring encloses, shape (R, 2); a ring no wider and no higher than F
+            is left out [m].
+        convex: Convex ring F, counter-clockwise, shape (n, 2) [m].
+
+    Returns:
+        Vertices of the cycles, shape (V, 2) [m], and where each begins, shape (R + 1,); none of small rings.
+    """
+    furthest = _furthest_out(points, first, convex)
+    starts = np.zeros(len(first), np.int64)
+    drawn = np.empty((0, 2))
+    width, height = _width(convex, 0), _width(convex, 1)
+    for writing in range(2):
+        size = 0
+        for r in range(len(first) - 1):
+            before = first[r + 1] - 1
+            small = extents[r, 0] <= width and extents[r, 1] <= height
+            for i in range(first[r], first[r] if small else first[r + 1]):
+                after = i + 1 if i + 1 < first[r + 1] else first[r]
+                k, last = furthest[before], furthest[i]
+                turn = _bends_in(points, before, i, after)
+                while True:
+                    if writing == 1:
+                        drawn[size, 0] = points[i, 0] - convex[k, 0]
+                        drawn[size, 1] = points[i, 1] - convex[k, 1]
+                    size += 1
+                    if k == last:
+                        break
+                    k = (k if k > 0 else len(convex)) - 1 if turn else last
+                before = i
+            starts[r + 1] = size
+        if writing == 0:
+            drawn = np.empty((size, 2))
+    return drawn, starts
+
+
+@compiled
+def _furthest_out(points: FloatArray, first: IntArray, convex: FloatArray) -> IntArray:
+    """Vertex of the footprint that lies furthest out beyond each edge, shape (E,)."""
+    furthest = np.zeros(len(points), np.int64)
+    for r in range(len(first) - 1):
+        for i in range(first[r], first[r + 1]):
+            after = i + 1 if i + 1 < first[r + 1] else first[r]
+            x, y = points[after, 1] - points[i, 1], points[i, 0] - points[after, 0]
+            most = -np.inf
+            for k in range(len(convex)):
+                out = x * convex[k, 0] + y * convex[k, 1]
+                if out > most:
+                    most, furthest[i] = out, k
+    return furthest
+
+
+@compiled(borrows=True)
+def _width(ring: FloatArray, axis: int) -> float:
+    """Width of a ring, shape (n, 2), along the first (0) or second (1) coordinate [m]."""
+    low, high = ring[0, axis], ring[0, axis]
+    for k in range(len(ring)):
+        low, high = min(low, ring[k, axis]), max(high, ring[k, axis])
+    width: float = high - low
+    return width
+
+
+@compiled(borrows=True)
+def _bends_in(points: FloatArray, before: int, here: int, after: int) -> bool:
+    """Whether a corner of the outline points into the floor, or is a needle, which blocks no more."""
+    ax, ay = points[here, 0] - points[before, 0], points[here, 1] - points[before, 1]
+    bx, by = points[after, 0] - points[here, 0], points[after, 1] - points[here, 1]
+    cross, dot = ax * by - ay * bx, ax * bx + ay * by
+    bends: bool = cross <= 0.0 or (dot < 0.0 and cross <= -_NEEDLE * dot)
+    return bends
+
 
 SAFE_SIDE = 1e-6
 """How far a workspace or a footprint is shrunk once [m]: a hundred times the clipping library's grid."""

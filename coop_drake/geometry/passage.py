@@ -6,18 +6,122 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from heapq import heappop, heappush
 from itertools import combinations
+from math import sqrt
 
 import numpy as np
 import shapely
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 from shapely import LineString, Polygon
 
 from coop_drake.errors import GeometryError
-from coop_drake.geometry.polygons import BoundaryDistance, edges_of
-from coop_drake.geometry.passage import IndexArray, cut_edges
-from coop_drake.geometry.passage import triangulate
+from coop_drake.geometry.distances import squared_distance
+from coop_drake.geometry.polygons import BoundaryDistance, edges_of, extent_of
 from coop_drake.jit import compiled
 from coop_drake.tree.pose import FloatArray, IntArray
+
+# Cuts the edges of rings into pieces that are short where the opposite wall is near.
+
+IndexArray = NDArray[np.intp]
+
+
+@compiled
+def cut_edges(
+    edges: FloatArray, shortest: float, coarsest: float, per_gap: float
+) -> tuple[FloatArray, IndexArray]:
+    """Halve every edge until its pieces are short against their distance to the opposite wall.
+
+    Args:
+        edges: Edges (x0, y0, x1, y1) of closed rings, shape (E, 4) [m].
+        shortest: Pieces of this length are not halved [m].
+        coarsest: Longer pieces are halved, however far the opposite wall is [m].
+        per_gap: Least number of pieces on a stretch as long as its distance to the opposite wall [-].
+
+    Returns:
+        Starts of the pieces in order, shape (n, 2) [m], and the edge of each, shape (n,).
+    """
+    starts = [(edges[0, 0], edges[0, 1])]
+    owners = [0]
+    for k in range(edges.shape[0]):
+        x0, y0, dx, dy = edges[k, 0], edges[k, 1], edges[k, 2] - edges[k, 0], edges[k, 3] - edges[k, 1]
+        length = sqrt(dx * dx + dy * dy)
+        stack = [(0.0, 1.0)]
+        while len(stack) > 0:
+            s, t = stack.pop()
+            gap = _gap(edges, k, x0 + 0.5 * (s + t) * dx, y0 + 0.5 * (s + t) * dy)
+            if (t - s) * length > max(shortest, min(coarsest, gap / per_gap)):
+                stack.append((0.5 * (s + t), t))
+                stack.append((s, 0.5 * (s + t)))
+            else:
+                starts.append((x0 + s * dx, y0 + s * dy))
+                owners.append(k)
+    return np.array(starts[1:]), np.array(owners[1:])
+
+
+@compiled(borrows=True)
+def _gap(edges: FloatArray, k: int, x: float, y: float) -> float:
+    """Distance of a point of edge k to the nearest edge that does not touch it [m]."""
+    gap = np.inf
+    for j in range(edges.shape[0]):
+        x0, y0, x1, y1 = edges[j, 0], edges[j, 1], edges[j, 2], edges[j, 3]
+        touches = False
+        for end in (0, 2):
+            u, v = edges[k, end], edges[k, end + 1]
+            touches = touches or (x0 == u and y0 == v) or (x1 == u and y1 == v)
+        if not touches:
+            gap = min(gap, squared_distance(x, y, x0, y0, x1, y1))
+    return sqrt(gap)
+
+
+# Triangles of a polygon between points of its rings, fine enough that diagonals cross passages squarely.
+
+PIECES_PER_GAP = 1.0
+"""Least number of pieces on a stretch of a ring as long as its distance to the opposite wall [-]."""
+
+FINEST = 500
+"""Size of the polygon over the length of the shortest pieces [-]; finer passages get oblique diagonals."""
+
+
+@dataclass(frozen=True)
+class Triangles:
+    """A triangulation of a polygon.
+
+    Attributes:
+        vertices: Points of the rings, shape (n, 2) [m].
+        ring: Ring of each vertex, 0 for the outer one, shape (n,).
+        corners: Vertices of each triangle, shape (t, 3).
+        diagonals: Vertices of the edges between two triangles, shape (d, 2).
+        neighbours: The two triangles on either side of them, shape (d, 2).
+    """
+
+    vertices: FloatArray
+    ring: IndexArray
+    corners: IndexArray
+    diagonals: IndexArray
+    neighbours: IndexArray
+
+
+def triangulate(polygon: Polygon) -> Triangles:
+    """Triangulate a polygon, its rings cut into pieces that are short where the opposite wall is near."""
+    polygon = shapely.remove_repeated_points(polygon)
+    sizes = [len(ring.coords) - 1 for ring in (polygon.exterior, *polygon.interiors)]
+    pieces, owners = cut_edges(edges_of(polygon), extent_of(polygon) / FINEST, np.inf, PIECES_PER_GAP)
+    ring_of = np.repeat(np.arange(len(sizes)), sizes)[owners]
+    cut = [pieces[ring_of == k] for k in range(len(sizes))]
+    triangles = shapely.get_parts(shapely.constrained_delaunay_triangles(Polygon(cut[0], cut[1:])))
+    vertices, first = np.unique(pieces, axis=0, return_index=True)
+    places = shapely.get_coordinates(triangles).reshape(-1, 4, 2)[:, :3]
+    known, corners = np.unique(np.vstack((vertices, places.reshape(-1, 2))), axis=0, return_inverse=True)
+    assert len(known) == len(vertices)  # no triangle has a corner of its own
+    corners = corners.ravel()[len(vertices) :].reshape(-1, 3)
+    sides = np.sort(corners[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+    owner = np.repeat(np.arange(len(corners)), 3)
+    order = np.lexsort((sides[:, 1], sides[:, 0]))
+    sides, owner = sides[order], owner[order]
+    twice = np.flatnonzero((sides[1:] == sides[:-1]).all(axis=1))
+    return Triangles(
+        vertices, ring_of[first], corners, sides[twice], np.column_stack((owner[twice], owner[twice + 1]))
+    )
+
 
 # The medial graph of a polygon: the Voronoi graph of samples of its boundary, as far as it lies inside.
 

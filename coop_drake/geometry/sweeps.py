@@ -1,7 +1,4 @@
-"""Compiled over-sweeps, eq. (6): a convex piece is swept by one joint after the other, up to the object.
-
-Every set is given by its support function in some directions, and enclosed by the lines that support it.
-"""
+"""Sweeps of convex pieces, eq. (6): polygons that enclose them in a slice, or that they cover all over it."""
 
 from __future__ import annotations
 
@@ -9,9 +6,32 @@ from math import atan2, ceil, cos, floor, hypot, pi, sin, sqrt
 
 import numpy as np
 
-from coop_drake.geometry.sweeps import SLACK
 from coop_drake.jit import compiled
 from coop_drake.tree.pose import FloatArray
+from coop_drake.tree.team_arrays import TeamArrays, moved
+
+# Convex polygons as sets of supporting lines ``n(angle) . x <= offset``: the arithmetic of all sweeps.
+
+SLACK = 1e-9
+"""Directed rounding [m]: outer offsets grow and inner offsets shrink by it."""
+
+
+def following(ring: FloatArray) -> FloatArray:
+    """Rotate a ring by one entry, so that entry i is what followed entry i; the shape (n, ...) stays."""
+    return np.concatenate((ring[1:], ring[:1]))
+
+
+def normals(angles: FloatArray) -> FloatArray:
+    """Unit vectors at the angles; shape (k,) [rad] to (k, 2)."""
+    result = np.empty((*angles.shape, 2))
+    np.cos(angles, out=result[..., 0])
+    np.sin(angles, out=result[..., 1])
+    return result
+
+
+# Compiled over-sweeps, eq. (6): a convex piece is swept by one joint after the other, up to the object.
+#
+# Every set is given by its support function in some directions, and enclosed by the lines that support it.
 
 _TURN = 2.0 * pi
 
@@ -248,3 +268,255 @@ def grown(vertices: FloatArray, radius: float, largest_turn: float) -> FloatArra
     for k in range(len(offsets)):
         offsets[k] += radius
     return circumscribed(directions, offsets)
+
+
+# Compiled under-sweeps: intersections of half-planes or discs, rounded inwards; no rows where empty.
+
+_SAME_NORMAL = 1e-12
+"""Lines whose normals differ by less count as parallel, and the inner one is kept [rad]."""
+
+_PARALLEL = 1e-12
+"""Lines whose normals have a smaller sine between them count as parallel [-]."""
+
+_SHORTEST_EDGE = 1e-9
+"""Shorter edges are left out [m]: they are within the rounding ``SLACK``."""
+
+
+@compiled
+def half_planes_polygon(angles: FloatArray, offsets: FloatArray) -> FloatArray:
+    """Intersection of half-planes that bound a polygon, rounded inwards by ``SLACK``.
+
+    Line i keeps the stretch between the largest of its lower and the smallest of its upper crossings with
+    all the others.
+
+    Args:
+        angles: Directions of the outward normals, shape (k,) [rad].
+        offsets: Signed distances of the lines from the origin, shape (k,) [m].
+
+    Returns:
+        Vertices, counter-clockwise, shape (m, 2); no rows where the intersection has no interior.
+    """
+    x, y, h, turned = (
+        np.empty(len(angles)),
+        np.empty(len(angles)),
+        np.empty(len(angles)),
+        np.empty(len(angles)),
+    )
+    count = 0
+    for i in range(len(angles)):
+        angle, offset = angles[i] - _TURN * floor(angles[i] / _TURN), offsets[i] - SLACK
+        k = count
+        while k > 0 and turned[k - 1] > angle:
+            turned[k], h[k] = turned[k - 1], h[k - 1]
+            k -= 1
+        turned[k], h[k] = angle, offset
+        count += 1
+    lines, count = count, 0
+    for i in range(lines):
+        if count > 0 and turned[i] - turned[count - 1] <= _SAME_NORMAL:
+            h[count - 1] = min(h[count - 1], h[i])
+            continue
+        turned[count], h[count] = turned[i], h[i]
+        x[count], y[count] = cos(turned[i]), sin(turned[i])
+        count += 1
+    vertices = np.empty((count, 2))
+    size = 0
+    for i in range(count):
+        lower, upper = -np.inf, np.inf
+        for j in range(count):
+            sine = x[i] * y[j] - y[i] * x[j]
+            left = h[j] - h[i] * (x[i] * x[j] + y[i] * y[j])
+            if abs(sine) < _PARALLEL:
+                if left < -_PARALLEL:
+                    upper = -np.inf
+            elif sine > 0.0:
+                upper = min(upper, left / sine)
+            else:
+                lower = max(lower, left / sine)
+        if upper - lower > _SHORTEST_EDGE:
+            vertices[size, 0], vertices[size, 1] = h[i] * x[i] - upper * y[i], h[i] * y[i] + upper * x[i]
+            size += 1
+    return vertices[: size if size >= 3 else 0]
+
+
+@compiled
+def shrunk(vertices: FloatArray, distance: float) -> FloatArray:
+    """Find points that keep a distance from the boundary of a convex polygon.
+
+    Args:
+        vertices: Convex ring, counter-clockwise, shape (n, 2) [m].
+        distance: The distance [m].
+
+    Returns:
+        Vertices of a convex polygon, shape (m, 2); no rows where it has no interior.
+    """
+    angles = edge_directions(vertices)
+    found: FloatArray = half_planes_polygon(angles, support(vertices, angles) - distance)
+    return found
+
+
+@compiled
+def under_revolute(vertices: FloatArray, centre: float, half_width: float) -> FloatArray:
+    """Find points that a convex polygon covers at every angle of an interval about the origin.
+
+    Every half-plane becomes its two extreme turns and, where it holds the pivot, chords of the circle that
+    it envelops. A half-plane without the pivot and a turn by pi or more have no common points.
+
+    Args:
+        vertices: Convex ring, counter-clockwise, shape (n, 2) [m].
+        centre: Middle of the interval [rad].
+        half_width: Half of its width [rad].
+
+    Returns:
+        Vertices of an enclosed convex polygon, shape (m, 2); no rows where none was found.
+    """
+    half_width = min(half_width, pi)  # A joint of many turns covers no more; its chords would leap over arcs.
+    edges = edge_directions(vertices)
+    offsets = support(vertices, edges)
+    parts = arc_parts(half_width)
+    half_chord = half_width / parts
+    angles, distances = np.empty(len(edges) * (2 + parts)), np.empty(len(edges) * (2 + parts))
+    size = 0
+    for i in range(len(edges)):
+        angle, offset = edges[i], offsets[i]
+        if offset <= 0.0 and half_width >= 0.5 * pi:
+            return np.empty((0, 2))
+        for side in (-1.0, 1.0):
+            angles[size], distances[size] = centre + angle + side * half_width, offset
+            size += 1
+        for part in range(parts if offset > 0.0 else 0):
+            angles[size] = centre + angle + half_chord * (2.0 * part + 1.0 - parts)
+            distances[size] = offset * cos(half_chord)
+            size += 1
+    return half_planes_polygon(angles[:size], distances[:size])
+
+
+@compiled
+def under_prismatic(vertices: FloatArray, x0: float, y0: float, x1: float, y1: float) -> FloatArray:
+    """Find points that a convex polygon covers at every displacement from (x0, y0) to (x1, y1) [m].
+
+    They are the points that both end copies cover; no rows where there are none. The ring is
+    counter-clockwise, shape (n, 2) [m].
+    """
+    angles = edge_directions(vertices)
+    offsets = support(vertices, angles)
+    for k in range(len(angles)):
+        x, y = cos(angles[k]), sin(angles[k])
+        offsets[k] += min(x * x0 + y * y0, x * x1 + y * y1)
+    return half_planes_polygon(angles, offsets)
+
+
+@compiled
+def common_disc(centres: FloatArray, radius: float, largest_turn: float) -> FloatArray:
+    """Polygon inside every disc of one radius [m] whose centre lies in a convex polygon, shape (n, 2) [m].
+
+    A point is within the radius of every centre if it is of every vertex; from their middle each ray leaves
+    the common part at the nearest exit. Neighbouring vertices of the result are ``largest_turn`` apart [rad];
+    it has no rows where the discs have no common part.
+    """
+    low_x, low_y, high_x, high_y = np.inf, np.inf, -np.inf, -np.inf
+    for i in range(len(centres)):
+        low_x, high_x = min(low_x, centres[i, 0]), max(high_x, centres[i, 0])
+        low_y, high_y = min(low_y, centres[i, 1]), max(high_y, centres[i, 1])
+    x, y = 0.5 * (low_x + high_x), 0.5 * (low_y + high_y)
+    directions = closed_directions(np.empty(0), largest_turn)
+    ring = np.empty((len(directions), 2))
+    for k in range(len(directions)):
+        u, v = cos(directions[k]), sin(directions[k])
+        reach = np.inf
+        for i in range(len(centres)):
+            dx, dy = x - centres[i, 0], y - centres[i, 1]
+            beyond = radius * radius - dx * dx - dy * dy
+            if beyond <= 0.0:
+                return np.empty((0, 2))
+            along = u * dx + v * dy
+            reach = min(reach, sqrt(along * along + beyond) - along)
+        reach *= 1.0 - 1e-9
+        ring[k, 0], ring[k, 1] = x + reach * u, y + reach * v
+    return ring
+
+
+# Compiled over-sweeps of a team's pieces, eq. (6): through one joint after the other, up to the object.
+
+
+@compiled
+def over_joint(
+    team: TeamArrays, link: int, vertices: FloatArray, lower: FloatArray, upper: FloatArray
+) -> FloatArray:
+    """Enclose a convex set that one joint moves through its interval, eq. (6).
+
+    Args:
+        team: The team.
+        link: Index of the component that the joint moves; the object's is turned by theta.
+        vertices: The set in that component's frame, see ``over_revolute``, shape (n, 2) [m].
+        lower: Lower ends of (theta, q...), shape (1 + n,) [rad, m].
+        upper: Upper ends, shape (1 + n,).
+
+    Returns:
+        Vertices in the parent's frame, in W for the object's component, shape (m, 2) [m].
+    """
+    axis = team.links[link, 1] - 2
+    low, high = lower[axis], upper[axis]
+    if team.links[link, 2] == 1:
+        ring = over_revolute(vertices, team.joints[link, 3] * 0.5 * (low + high), 0.5 * (high - low))
+    else:
+        ax, ay = team.joints[link, 4], team.joints[link, 5]
+        ring = over_prismatic(vertices, ax * low, ay * low, ax * high, ay * high)
+    x, y, angle = team.joints[link, 0], team.joints[link, 1], team.joints[link, 2]
+    c, s = cos(angle), sin(angle)
+    for i in range(len(ring)):
+        ring[i, 0], ring[i, 1] = moved(x, y, c, s, ring[i, 0], ring[i, 1])
+    return ring
+
+
+@compiled(borrows=True)
+def joint_width(team: TeamArrays, link: int, lower: FloatArray, upper: FloatArray) -> float:
+    """Width of the interval of the joint that moves a component [rad or m]; others as in ``over_joint``."""
+    axis = team.links[link, 1] - 2
+    width: float = upper[axis] - lower[axis]
+    return width
+
+
+@compiled
+def over_piece(
+    team: TeamArrays, piece: int, lower: FloatArray, upper: FloatArray, stages: int, rounded: bool
+) -> FloatArray:
+    """Compute a polygon that encloses a piece at every configuration of a slice, eq. (6).
+
+    Args:
+        team: The team.
+        piece: Index of the piece.
+        lower: Lower ends of (theta, q...), shape (1 + n,) [rad, m].
+        upper: Upper ends, shape (1 + n,).
+        stages: Number of joints to sweep, from the piece's own; theta is the last one, and any larger number
+            means all.
+        rounded: Whether to grow the sweep by the piece's radius.
+
+    Returns:
+        Vertices, counter-clockwise, shape (n, 2) [m].
+    """
+    ring = team.vertices[team.pieces[piece, 1] : team.pieces[piece, 2]].copy()
+    widest = 0.0
+    link = team.pieces[piece, 0]
+    while link >= 0 and stages > 0:
+        widest = max(widest, joint_width(team, link, lower, upper))
+        ring = over_joint(team, link, ring, lower, upper)
+        link, stages = team.links[link, 0], stages - 1
+    return rounded_sweep(team, piece, ring, widest) if rounded else ring
+
+
+@compiled
+def rounded_sweep(team: TeamArrays, piece: int, ring: FloatArray, widest: float) -> FloatArray:
+    """Grow the sweep of a piece's vertices by its radius.
+
+    Args:
+        team: The team.
+        piece: Index of the piece.
+        ring: The sweep, shape (n, 2) [m].
+        widest: Width of the widest interval that it was swept through [rad or m].
+
+    Returns:
+        Vertices, shape (m, 2) [m].
+    """
+    radius = team.radii[piece]
+    return grown(ring, radius, disc_turn(0.5 * widest)) if radius > 0.0 else ring

@@ -11,8 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from shapely import Point
 
 from coop_drake.errors import FieldError
-from coop_drake.geometry.polygons import edges_of
-from coop_drake.geometry.polygons import extent_of
+from coop_drake.geometry.polygons import edges_of, extent_of
 from coop_drake.harmonic_maps.evaluate import FlatMap, evaluate_one, is_inside, nearest_on_walls
 from coop_drake.harmonic_maps.harmonic_map import HarmonicMap
 from coop_drake.harmonic_maps.outline import as_points

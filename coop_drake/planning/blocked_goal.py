@@ -12,10 +12,9 @@ from shapely.errors import ShapelyError
 
 from coop_drake.answers.problem import PlanningProblem, at_goal, goal_box
 from coop_drake.answers.proof import InfeasibilityProof, OverCell, OverSlice, Witness
-from coop_drake.geometry.swept_tree import BodyPairs
-from coop_drake.geometry.sweeps import normals
 from coop_drake.geometry.minkowski import FreeSpace
-from coop_drake.geometry.swept_tree import Interval, Intervals, SweptTree
+from coop_drake.geometry.sweeps import normals
+from coop_drake.geometry.swept_tree import BodyPairs, Interval, Intervals, SweptTree
 from coop_drake.planning.cells.cells import CellMaker, Region
 from coop_drake.planning.cells.slices import halves
 from coop_drake.planning.certificates import FAILURES, Floor, Witnesses

@@ -9,10 +9,9 @@ from typing import NamedTuple
 import numpy as np
 from shapely import MultiPolygon, Polygon
 
-from coop_drake.geometry.swept_tree import TOUCH, BodyPairs
 from coop_drake.geometry.distances import separated
 from coop_drake.geometry.sweeps import joint_width, over_joint, rounded_sweep
-from coop_drake.geometry.swept_tree import SweptTree
+from coop_drake.geometry.swept_tree import TOUCH, BodyPairs, SweptTree
 from coop_drake.jit import compiled
 from coop_drake.planning.cells.cells import FreeBox
 from coop_drake.planning.duration import SETTLING_TIME, SPEED_PER_CLEARANCE

@@ -15,8 +15,7 @@ from coop_drake.answers.digest import problem_digest
 from coop_drake.answers.plan import Plan
 from coop_drake.answers.problem import PlanningProblem
 from coop_drake.errors import GeometryError, PlanError, StallError, TooQuickError
-from coop_drake.geometry.swept_tree import BodyPairs
-from coop_drake.geometry.swept_tree import SweptTree
+from coop_drake.geometry.swept_tree import BodyPairs, SweptTree
 from coop_drake.jit import compiled
 from coop_drake.laws import GainSet
 from coop_drake.laws.funnels import CLOSING
@@ -217,8 +216,9 @@ def cover_path(
 ) -> PathCovering | None:
     """Cover a path with boxes such that the transport is fast: few boxes, and narrow ones in narrow passages.
 
-    The boxes are chosen by their times in closed form, see ``choose_boxes``. Every box is then proved free as in the
-    search, by over-sweeps and Minkowski differences at margin zero; a box that is not proved is not used.
+    The boxes are chosen by their times in closed form, see ``choose_boxes``. Every box is then proved
+    free as in the search, by over-sweeps and Minkowski differences at margin zero; a box that is not
+    proved is not used.
 
     Args:
         problem: What was asked.
@@ -371,7 +371,7 @@ def choose_boxes(waypoints: Waypoints) -> IntArray:
     time, before = np.full((n, count), np.inf), np.zeros((n, count, 2), np.int64)
     time[0] = 0.0
     least, most = waypoints.path[:, 2:].copy(), waypoints.path[:, 2:].copy()
-    travel = np.zeros((n, count))  # The object's time in the longest box that was swept; infinite if too long.
+    travel = np.zeros((n, count))  # The object's time in the longest box so far; infinite: not free.
     lower, upper, goals = np.empty(m), np.empty(m), np.empty((2, m))
     for j in range(1, n):
         nexts = 1 if j + 1 == n else count
@@ -438,9 +438,7 @@ def _travel(waypoints: Waypoints, i: int, j: int, clearances: FloatArray) -> flo
 
 
 @compiled
-def _closing(
-    waypoints: Waypoints, i: int, lower: FloatArray, upper: FloatArray, goals: FloatArray
-) -> float:
+def _closing(waypoints: Waypoints, i: int, lower: FloatArray, upper: FloatArray, goals: FloatArray) -> float:
     """Time in which the axes reach their goal intervals, most of the time that their funnels close in [s].
 
     Args:

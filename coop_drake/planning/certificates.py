@@ -15,11 +15,9 @@ from shapely.errors import ShapelyError
 from coop_drake.answers.problem import PlanningProblem, goal_box
 from coop_drake.answers.proof import Cut, InfeasibilityProof, OverCell, OverSlice, Squeeze, Witness
 from coop_drake.errors import GeometryError
-from coop_drake.geometry.swept_tree import BodyPair, BodyPairs
-from coop_drake.geometry.minkowski import FreeSpace, to_polygon
+from coop_drake.geometry.minkowski import FreeSpace, shared, to_polygon
 from coop_drake.geometry.polygons import parts_of
-from coop_drake.geometry.minkowski import shared
-from coop_drake.geometry.swept_tree import Interval, Intervals, SweptTree
+from coop_drake.geometry.swept_tree import BodyPair, BodyPairs, Interval, Intervals, SweptTree
 from coop_drake.planning.cells.cells import CellMaker, Region, regions_of
 from coop_drake.planning.cells.slices import Slices
 from coop_drake.tree.component_tree import ComponentTree

@@ -14,12 +14,10 @@ from coop_drake.answers.plan import MixedCell
 from coop_drake.answers.problem import PlanningProblem
 from coop_drake.answers.proof import InfeasibilityProof
 from coop_drake.errors import PlanError
-from coop_drake.geometry.swept_tree import BodyPairs
-from coop_drake.geometry.polygons import BoundaryDistance
 from coop_drake.geometry.minkowski import FreeSpace, to_polygon
-from coop_drake.geometry.polygons import parts_of
 from coop_drake.geometry.passage import pole
-from coop_drake.geometry.swept_tree import Intervals, SweptTree
+from coop_drake.geometry.polygons import BoundaryDistance, parts_of
+from coop_drake.geometry.swept_tree import BodyPairs, Intervals, SweptTree
 from coop_drake.planning.cells.cells import CellMaker, FreeBox, Region, end_in, regions_of
 from coop_drake.planning.questions import disc_polygon, ending_at, is_patched, marginal_workspace, nearby
 from coop_drake.tree.component_tree import nearest_turn, turns_to

@@ -16,11 +16,11 @@ from shapely.geometry.base import BaseGeometry
 from coop_drake.answers.limits import TeamLimits
 from coop_drake.answers.problem import ROUNDING, PlanningProblem, at_goal, goal_box
 from coop_drake.errors import GeometryError, PlanError
-from coop_drake.geometry.minkowski import components
-from coop_drake.geometry.sweeps import normals
-from coop_drake.geometry.minkowski import FreeSpace, to_polygon
+from coop_drake.geometry.minkowski import FreeSpace, components, to_polygon
 from coop_drake.geometry.polygons import parts_of, polygon_rings
-from coop_drake.tree.component_tree import Component, ComponentTree, TreeJoint, nearest_turn
+from coop_drake.geometry.sweeps import normals
+from coop_drake.tree.component_tree import nearest_turn
+from coop_drake.tree.component_tree import Component, ComponentTree, TreeJoint
 from coop_drake.tree.pose import FloatArray
 
 # Checks of a question before the search: finite numbers of the right count, joints within their limits.
@@ -180,10 +180,10 @@ def is_patched(problem: PlanningProblem, margin: float) -> bool:
 def _close_ends(problem: PlanningProblem, margin: float) -> list[tuple[BaseGeometry, float]]:
     """Footprints at start and goal that are too close to a wall for a margin, and their clearances [m]."""
     close = []
-    for (configuration, components), bound in zip(_ends(problem), _end_clearances(problem), strict=True):
+    for (configuration, some), bound in zip(_ends(problem), _end_clearances(problem), strict=True):
         if bound >= CLOSE_FACTOR * margin:
             continue
-        footprint = exact_footprint(problem.tree, configuration, components)
+        footprint = exact_footprint(problem.tree, configuration, some)
         clearance = float(problem.workspace.boundary.distance(footprint))
         if clearance < CLOSE_FACTOR * margin and problem.workspace.contains(footprint):
             close.append((footprint, clearance))

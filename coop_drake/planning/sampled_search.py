@@ -12,8 +12,7 @@ from shapely.errors import ShapelyError
 
 from coop_drake.answers.problem import PlanningProblem, at_goal, goal_box
 from coop_drake.errors import GeometryError
-from coop_drake.geometry.swept_tree import BodyPairs
-from coop_drake.geometry.swept_tree import SweptTree
+from coop_drake.geometry.swept_tree import BodyPairs, SweptTree
 from coop_drake.planning.boxes import Certifier
 from coop_drake.planning.cells.cells import FreeBox
 from coop_drake.planning.channel import Channel, CoveredPath, Regions, make_channel

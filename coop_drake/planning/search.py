@@ -21,9 +21,8 @@ from shapely.errors import ShapelyError
 from coop_drake.answers.plan import SearchReport
 from coop_drake.answers.problem import PlanningProblem
 from coop_drake.errors import GeometryError, PatienceError, PlanError
-from coop_drake.geometry.swept_tree import BodyPairs
 from coop_drake.geometry.minkowski import to_polygon
-from coop_drake.geometry.swept_tree import SweptTree
+from coop_drake.geometry.swept_tree import BodyPairs, SweptTree
 from coop_drake.planning.blocked_goal import blocked_goal, touch_at_goal
 from coop_drake.planning.cells.as_printed import PaperExploration
 from coop_drake.planning.cells.cells import CellMaker, FreeBox

@@ -15,9 +15,8 @@ from coop_drake.answers.digest import problem_digest
 from coop_drake.answers.plan import Cell, Plan, Transition
 from coop_drake.answers.problem import PlanningProblem, goal_box
 from coop_drake.errors import GeometryError, PlanError, StallError
-from coop_drake.geometry.polygons import BoundaryDistance
-from coop_drake.geometry.polygons import component_at
 from coop_drake.geometry.passage import Passage, PassageFinder
+from coop_drake.geometry.polygons import BoundaryDistance, component_at
 from coop_drake.geometry.simplify import tidy_cell
 from coop_drake.laws import GainSet, ScheduledGains, TransitionGains, transition_gains
 from coop_drake.planning.cells.cells import FreeBox

@@ -6,8 +6,8 @@ import numpy as np
 from shapely import Polygon, box
 
 from coop_drake.answers.problem import PlannerSettings, PlanningProblem
-from coop_drake.geometry.sweeps import normals
 from coop_drake.geometry.passage import PassageFinder
+from coop_drake.geometry.sweeps import normals
 from coop_drake.laws import ScheduledGains
 from coop_drake.planning.planner import plan
 from coop_drake.planning.proofs import Proofs

@@ -2,10 +2,15 @@ import numpy as np
 import pytest
 from shapely import Polygon, box
 
-from coop_drake.geometry.sweeps import normals
 from coop_drake.geometry.distances import separated
-from coop_drake.geometry.sweeps import circumscribed, closed_directions, edge_directions, support
-from coop_drake.geometry.sweeps import half_planes_polygon
+from coop_drake.geometry.sweeps import (
+    circumscribed,
+    closed_directions,
+    edge_directions,
+    half_planes_polygon,
+    normals,
+    support,
+)
 
 SQUARE = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
 

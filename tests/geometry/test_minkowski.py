@@ -5,9 +5,9 @@ from hypothesis import strategies as st
 from shapely import MultiPoint, MultiPolygon, Polygon, box, union_all
 from shapely.affinity import translate
 
-from coop_drake.geometry import large_floors, minkowski
-from coop_drake.geometry.minkowski import common
-from coop_drake.geometry.minkowski import SAFE_SIDE, FreeSpace, to_polygon
+from coop_drake.geometry import minkowski
+from coop_drake.geometry import minkowski as large_floors
+from coop_drake.geometry.minkowski import SAFE_SIDE, FreeSpace, common, to_polygon
 from coop_drake.geometry.polygons import polygon_rings
 from tests.support.trees import room
 

@@ -5,9 +5,15 @@ from hypothesis import strategies as st
 from shapely import LineString, MultiPoint, Point, Polygon
 from shapely.affinity import rotate
 
-from coop_drake.geometry.sweeps import grown, over_prismatic, over_revolute
+from coop_drake.geometry.sweeps import (
+    common_disc,
+    grown,
+    over_prismatic,
+    over_revolute,
+    under_prismatic,
+    under_revolute,
+)
 from coop_drake.geometry.swept_tree import inscribed
-from coop_drake.geometry.sweeps import common_disc, under_prismatic, under_revolute
 
 RECTANGLE = np.array([[0.1, -0.1], [0.6, -0.1], [0.6, 0.1], [0.1, 0.1]])
 ROUND_PIVOT = np.array([[-0.3, -0.2], [0.6, -0.2], [0.5, 0.3], [-0.2, 0.25]])

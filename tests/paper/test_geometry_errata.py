@@ -5,8 +5,7 @@ from shapely import Point, Polygon, box
 from shapely.affinity import rotate, translate
 
 from coop_drake.geometry.minkowski import FreeSpace, to_polygon
-from coop_drake.geometry.sweeps import over_revolute
-from coop_drake.geometry.sweeps import under_revolute
+from coop_drake.geometry.sweeps import over_revolute, under_revolute
 
 WORKSPACE = box(0.0, 0.0, 4.0, 2.0)
 BAR = np.array([[-0.5, -0.05], [0.5, -0.05], [0.5, 0.05], [-0.5, 0.05]])

@@ -5,10 +5,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from coop_drake.geometry.swept_tree import BodyPairs
 from coop_drake.geometry.polygons import polygon_rings
 from coop_drake.geometry.sweeps import over_piece
-from coop_drake.geometry.swept_tree import SweptTree
+from coop_drake.geometry.swept_tree import BodyPairs, SweptTree
 from coop_drake.planning.boxes import box_arrays, box_clearance, room_for_sweeps, sweeps_apart, swept_piece
 from coop_drake.planning.cells.cells import CellMaker
 from coop_drake.planning.sampling.collision import FAR, grid_inside, lay_grid, team_clearance

@@ -8,8 +8,8 @@ import pytest
 from shapely import Point
 
 from benchmarks.planner.family import corridor_problem
-from coop_drake.geometry.sweeps import following
 from coop_drake.geometry.polygons import polygon_rings
+from coop_drake.geometry.sweeps import following
 from coop_drake.planning import Channel, find_channel, sampled_search
 from coop_drake.planning.sampled_search import SampledSearch
 from coop_drake.planning.sampling.band import clearances

@@ -4,13 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from coop_drake.planning.box_crossing import cross_box, object_motion, soonest_exit
 from shapely import Point
 
 from coop_drake.answers.plan_file import check_plan
 from coop_drake.laws import FixedGains, ScheduledGains, transition_gains
 from coop_drake.laws.gain_schedule import schedule_of
 from coop_drake.planning import make_plan, plan_time
-from coop_drake.planning.box_crossing import cross_box, object_motion, soonest_exit
 from coop_drake.planning.cell_selection import cover_path, quickest_plan
 from coop_drake.planning.cells.cells import CellMaker
 from coop_drake.planning.duration import speed_per_clearance

@@ -9,6 +9,7 @@ from dataclasses import replace
 from types import FunctionType
 
 import numpy as np
+from coop_drake.planning.box_crossing import cross_box, object_motion
 
 from coop_drake.answers.plan import Plan
 from coop_drake.compiled_loop import CompiledTransport, prepare
@@ -21,7 +22,6 @@ from coop_drake.geometry.polygons import edges_of
 from coop_drake.laws import ScheduledGains
 from coop_drake.laws.axis_table import axis_table
 from coop_drake.laws.gain_schedule import schedule_of
-from coop_drake.planning.box_crossing import cross_box, object_motion
 from coop_drake.planning.duration import cross_cell
 from coop_drake.plant import set_configuration
 from coop_drake.scenario import Deployment

@@ -8,9 +8,8 @@ from hypothesis import strategies as st
 from shapely import MultiPolygon, Point, Polygon
 from shapely.affinity import scale
 
-from coop_drake.geometry.swept_tree import BodyPairs
 from coop_drake.geometry.minkowski import to_polygon
-from coop_drake.geometry.swept_tree import SweptTree
+from coop_drake.geometry.swept_tree import BodyPairs, SweptTree
 from coop_drake.planning.cells.cells import CellMaker, Region
 from tests.support.free_positions import FreePositions, nudges
 from tests.support.shapes import floors

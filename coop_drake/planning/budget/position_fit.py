@@ -21,9 +21,8 @@ from coop_drake.answers.budget import Budget, PositionTube
 from coop_drake.answers.plan import Cell, Plan, Transition
 from coop_drake.answers.problem import PlanningProblem
 from coop_drake.errors import GeometryError, StallError
-from coop_drake.geometry.polygons import BoundaryDistance
-from coop_drake.geometry.polygons import component_at, parts_of
 from coop_drake.geometry.passage import pole
+from coop_drake.geometry.polygons import BoundaryDistance, component_at, parts_of
 from coop_drake.geometry.simplify import tidy_cell
 from coop_drake.laws import ScheduledGains
 from coop_drake.planning.budget.alarms import alarms_of, position_room, rubbed

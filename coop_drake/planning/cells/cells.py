@@ -5,182 +5,19 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import NamedTuple
 
 import numpy as np
-import shapely
 from manifold3d import CrossSection
 from shapely import MultiPolygon, Polygon
 
 from coop_drake.answers.problem import PlanningProblem, goal_box
-from coop_drake.geometry.swept_tree import BodyPair, BodyPairs
+from coop_drake.geometry.minkowski import FreeSpace, components, meet, shared, to_polygon
 from coop_drake.geometry.polygons import BoundaryDistance
 from coop_drake.geometry.sweeps import following, normals
-from coop_drake.geometry.minkowski import FreeSpace, to_polygon
-from coop_drake.geometry.minkowski import components, meet, shared
-from coop_drake.geometry.squeeze_kernels import convex_hull, squeezed
-from coop_drake.geometry.swept_tree import Intervals, SweptTree
+from coop_drake.geometry.swept_tree import BodyPair, BodyPairs, Intervals, SweptTree
+from coop_drake.planning.cells.squeezes import SqueezedPair, Squeezes
 from coop_drake.tree.component_tree import nearest_turn
-from coop_drake.tree.pose import FloatArray, PlanarPose
-
-# Positions at which walls on either side hold two round pieces so near to each other that these overlap.
-#
-# Pieces that are swept over a slice one by one lose accuracy in proportion to the slice's width. Here what
-# the walls leave to two bases is compared with the vector between them, which loses accuracy along the
-# walls alone.
-
-LARGEST_BREADTH = 0.15
-"""Cells that are broader than this times the smallest radius (area over perimeter) are not tried [-]."""
-
-LARGEST_DISTANCE = 1.5
-"""Pieces are not tried that are everywhere further apart than this times the sum of their radii [-]."""
-
-SPARE = 1e-6
-"""All statements must hold with this to spare [m], for rounding."""
-
-PARTS = 16
-"""Copies of what turns by an interval are this part of it apart [-], as in the exact checker."""
-
-
-Places = tuple[FloatArray, float]
-"""Corners of a convex set, shape (n, 2), and how far it reaches beyond them [m]."""
-
-
-@dataclass(frozen=True, eq=False)
-class SqueezedPair:
-    """Positions that are forbidden all over a slice, because two round pieces touch a wall or each other.
-
-    Attributes:
-        pieces: Indices of the pieces in ``SweptTree.pieces``.
-        polygon: The positions: corners of a convex polygon, counter-clockwise, shape (n, 2) [m].
-        cuts: For each piece unit vectors u and limits [m], shape (c, 3). Where its centre a has u . a above a
-            limit, and not above those before it, it touches a wall.
-    """
-
-    pieces: tuple[int, int]
-    polygon: FloatArray
-    cuts: tuple[FloatArray, FloatArray]
-
-
-class _Candidate(NamedTuple):
-    """Two discs in a slice: pieces, their centres' places about p, vectors between these, radii, and loss."""
-
-    pieces: tuple[int, int]
-    places: tuple[FloatArray, FloatArray]
-    apart: FloatArray
-    radii: FloatArray
-    loss: float
-
-
-class Squeezes:
-    """Looks for squeezed pairs.
-
-    Args:
-        swept: Sweeps of the team's pieces.
-        pairs: Pairs of bodies that must not touch.
-        walls: The walls, shape (m, 4) as (x0, y0, x1, y1) [m].
-
-    Attributes:
-        breadth: Cells that are broader (area over perimeter) are not worth a trial [m]; 0 without two discs.
-    """
-
-    def __init__(self, swept: SweptTree, pairs: BodyPairs, walls: FloatArray) -> None:
-        self._swept = swept
-        self._known: dict[tuple[object, ...], Places] = {}
-        self._lower = np.minimum(walls[:, :2], walls[:, 2:])
-        self._upper = np.maximum(walls[:, :2], walls[:, 2:])
-        self._walls = walls
-        shapes = [piece.shape for piece in swept.pieces]
-        self._pairs = [
-            (i, j, first, second, np.array([shapes[i].radius, shapes[j].radius]))
-            for i, j, first, second in pairs.pieces.tolist()
-            if len(shapes[i].vertices) == len(shapes[j].vertices) == 1
-        ]
-        least = min([radii.min() for *_, radii in self._pairs], default=0.0)
-        self.breadth = LARGEST_BREADTH * least
-
-    def find(self, intervals: Intervals, corners: FloatArray, growth: float) -> SqueezedPair | None:
-        """A pair that is squeezed at all configurations of a slice and at all positions of a cell, if any is.
-
-        Args:
-            intervals: The slice.
-            corners: Corners of the cell, shape (n, 2) [m].
-            growth: The positions reach at least 0.7 times this beyond the cell's convex hull [m].
-        """
-        pairs = self._candidates(intervals)
-        if not pairs:
-            return None
-        hull = shapely.MultiPoint(corners).convex_hull.buffer(growth, quad_segs=1)
-        ring = convex_hull(shapely.get_coordinates(hull))
-        for pair in pairs:
-            one, other = (convex_hull((ring[:, None] + about).reshape(-1, 2)) for about in pair.places)
-            near = self._near(np.concatenate((one, other)), float(pair.radii.max()))
-            overlapping, cuts, first = squeezed(one, other, pair.apart, near, pair.radii, pair.loss)
-            if overlapping:
-                return SqueezedPair(pair.pieces, ring, (cuts[:first], cuts[first:]))
-        return None
-
-    def _candidates(self, intervals: Intervals) -> list[_Candidate]:
-        """Pairs near enough to each other somewhere in a slice."""
-        found = []
-        for i, j, first, second, radii in self._pairs:
-            apart, spread = self._apart(intervals, i, j, first, second)
-            if np.hypot(*apart.T).min() < LARGEST_DISTANCE * radii.sum():
-                (one, grown), (other, more) = self._places(i, intervals), self._places(j, intervals)
-                found.append(_Candidate((i, j), (one, other), apart, radii, SPARE + max(grown, more, spread)))
-        return found
-
-    def _places(self, index: int, intervals: Intervals, stages: int | None = None) -> Places:
-        """Where a disc's centre may be after some stages of its chain, all if none are given."""
-        piece = self._swept.pieces[index]
-        axes = piece.axes[:stages]
-        key = (index, len(axes), *[intervals[axis] for axis in axes])
-        if key not in self._known:
-            steps = list(zip(piece.chain, axes, strict=False))
-            self._known[key] = self._moved((piece.shape.vertices, 0.0), steps, intervals, sliding=True)
-        return self._known[key]
-
-    def _apart(self, intervals: Intervals, i: int, j: int, first: int, second: int) -> Places:
-        """All vectors from one centre to another, in directions of W."""
-        pieces = self._swept.pieces
-        key = (i, j, "apart", *[intervals[axis] for axis in (*pieces[i].axes, *pieces[j].axes)])
-        if key not in self._known:
-            one, grown = self._places(i, intervals, first)
-            other, more = self._places(j, intervals, second)
-            between = convex_hull((other[:, None] - one).reshape(-1, 2)), grown + more
-            steps = list(zip(pieces[i].chain[first:], pieces[i].axes[first:], strict=True))
-            self._known[key] = self._moved(between, steps, intervals, sliding=False)
-        return self._known[key]
-
-    def _moved(
-        self, places: Places, steps: list[tuple[int, int]], intervals: Intervals, *, sliding: bool
-    ) -> Places:
-        """Places that are moved by the joints of components, each with its axis, or only turned by them.
-
-        A point at the distance r is nowhere further than r b^2 / 8 from the segment between two of its copies
-        that are turned by b against each other.
-        """
-        points, grown = places
-        for component, axis in steps:
-            joint, (low, high) = self._swept.tree.components[component].joint, intervals[axis]
-            X = PlanarPose(0.0, 0.0, 0.0) if joint is None else joint.X_PJ
-            if joint is None or joint.kind == "revolute":
-                grown += float(np.hypot(*points.T).max()) * ((high - low) / PARTS) ** 2 / 8.0
-                turns = (1.0 if joint is None else joint.sign) * np.linspace(low, high, PARTS + 1)
-                c, s, (x, y) = np.cos(turns)[:, None], np.sin(turns)[:, None], points.T
-                points = convex_hull(np.stack((c * x - s * y, s * x + c * y), axis=-1).reshape(-1, 2))
-            elif sliding:
-                ends = np.array([low, high])[:, None, None] * np.array(joint.axis)
-                points = convex_hull((points + ends).reshape(-1, 2))
-            points = (X if sliding else PlanarPose(0.0, 0.0, X.angle)).apply(points)
-        return points, grown
-
-    def _near(self, places: FloatArray, distance: float) -> FloatArray:
-        """Walls whose boxes are not further than a distance from places, shape (k, 4) [m]."""
-        low, high = places.min(axis=0) - distance, places.max(axis=0) + distance
-        near: FloatArray = self._walls[((self._lower <= high) & (self._upper >= low)).all(axis=1)]
-        return near
-
+from coop_drake.tree.pose import FloatArray
 
 NEGLIGIBLE_AREA = 1e-9
 """Under-cells with less area are dropped: they are remnants of rounding [m^2]."""

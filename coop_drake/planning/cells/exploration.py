@@ -12,9 +12,8 @@ from shapely import MultiPolygon, Polygon
 
 from coop_drake.answers.plan import MixedCell
 from coop_drake.answers.problem import PlanningProblem, goal_box
-from coop_drake.geometry.swept_tree import BodyPairs
 from coop_drake.geometry.minkowski import to_polygon
-from coop_drake.geometry.swept_tree import Intervals, SweptTree
+from coop_drake.geometry.swept_tree import BodyPairs, Intervals, SweptTree
 from coop_drake.planning.cells.cells import CellMaker, FreeBox, Region, end_in
 from coop_drake.planning.cells.graph import CellGraph, GraphCell, Kind
 from coop_drake.planning.cells.slices import Slices, holds, meets

@@ -13,7 +13,6 @@ from typing import NamedTuple
 import numpy as np
 from shapely import MultiPolygon, Polygon
 
-from coop_drake.geometry.sweeps import following
 from coop_drake.geometry.distances import (
     meets_ring,
     ray_crosses,
@@ -23,6 +22,7 @@ from coop_drake.geometry.distances import (
 )
 from coop_drake.geometry.minkowski import FreeSpace
 from coop_drake.geometry.polygons import polygon_rings
+from coop_drake.geometry.sweeps import following
 from coop_drake.jit import compiled
 from coop_drake.tree.pose import FloatArray, IntArray
 from coop_drake.tree.team_arrays import TeamArrays, place_into

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from shapely import MultiPolygon, Polygon
 
 from coop_drake.answers.problem import PlanningProblem
-from coop_drake.geometry.sweeps import following
 from coop_drake.geometry.polygons import parts_of, polygon_rings
+from coop_drake.geometry.sweeps import following
 from coop_drake.jit import compiled
 from coop_drake.planning.questions import nearby
 from coop_drake.planning.sampling.band import clearances, improve
