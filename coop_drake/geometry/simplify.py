@@ -14,7 +14,7 @@ from shapely import LineString, Point, Polygon
 from coop_drake.errors import GeometryError
 from coop_drake.geometry.distances import segments_cross, squared_distance, twice_area
 from coop_drake.geometry.passage import IndexArray, PassageFinder
-from coop_drake.geometry.polygons import BoundaryDistance, component_at, corners_of
+from coop_drake.geometry.polygons import BoundaryDistance, component_at, corners_of, extent_of
 from coop_drake.jit import compiled
 from coop_drake.tree.pose import FloatArray
 
@@ -224,15 +224,18 @@ STRIDE, MOST_STRIDES = 0.5, 100
 """Discs of the corridor follow one another by this part of the passage's clearance [-], but there are not
 more than about this many."""
 
+SLIT = 0.2
+"""Width of a slit over the passage's clearance [-]: the sides of a narrower one nearly coincide."""
+
 
 def tidy_cell(safe: Polygon, points: Sequence[FloatArray]) -> Polygon:
     """Make a cell Q that can be mapped of a safe region S: opening(S, b/2), cut to a corridor, simplified.
 
     b is the clearance of the widest passage through the given points. The opening and the corridor keep the
     passage's clearance, and simplification takes off at most a fifth of it. The corridor leaves out bays that
-    the passage goes by, and most holes: a field that is harmonic in it follows the passage more closely. The
-    opening as a whole is taken where it has fewer vertices and no more holes, and S itself where rounding
-    spoils both.
+    the passage goes by: a field that is harmonic in it follows the passage more closely. Holes are cut open
+    by slits away from the passage, for without holes a field stands still nowhere. The opening as a whole is
+    taken where it has fewer vertices and no more holes, and S itself where rounding spoils both.
 
     Args:
         safe: S, with holes or without [m].
@@ -270,12 +273,24 @@ def _tidied(region: Polygon, path: LineString, clearance: float) -> Iterator[Pol
     # GEOS may give a mitred boundary that crosses itself, which it then refuses to intersect.
     opened = component_at(shapely.make_valid(dilated).intersection(region), start)
     stride = max(STRIDE * clearance, path.length / MOST_STRIDES)
-    places = shapely.points(shapely.get_coordinates(shapely.segmentize(path, stride)))
-    room = BoundaryDistance(region).batch(shapely.get_coordinates(places))
-    discs = shapely.buffer(places, CORRIDOR * room, quad_segs=4)
+    places = shapely.get_coordinates(shapely.segmentize(path, stride) if path.length > 0.0 else path)
+    room = BoundaryDistance(region).batch(places)
+    discs = shapely.buffer(shapely.points(places), CORRIDOR * room, quad_segs=4)
     links = shapely.convex_hull([shapely.MultiPolygon([*pair]) for pair in pairwise(discs)])
     for shape in (opened, component_at(shapely.union_all(links).intersection(opened), start)):
         if not shape.is_empty:
             # What the opening leaves out in the middle of a region without holes is safe all the same.
-            whole = shape if region.interiors else Polygon(shape.exterior)
+            whole = _cut_open(shape, path, clearance) if region.interiors else Polygon(shape.exterior)
             yield simplify_inward(whole, depth, STANDING_OUT)
+
+
+def _cut_open(shape: Polygon, path: LineString, clearance: float) -> Polygon:
+    """The part of a shape around a path, with slits from all holes away from the path to the outer ring."""
+    half, slits = 0.5 * SLIT * clearance, []
+    for hole in shape.interiors:
+        near, end = shapely.get_coordinates(shapely.shortest_line(path, hole))
+        away = (end - near) / np.hypot(*(end - near))
+        ray = LineString([end, end + extent_of(shape) * away])
+        length = half + Point(end).distance(ray.intersection(shape.exterior))
+        slits.append(LineString([end - half * away, end + length * away]).buffer(half, cap_style="flat"))
+    return component_at(shape.difference(shapely.union_all(slits)), Point(path.coords[0]))

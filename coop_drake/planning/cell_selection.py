@@ -169,28 +169,15 @@ LEAST_CLEARANCE = 2e-3
 CORE_FRACTION = 0.9
 """Fraction of the waypoints' clearance that cores keep, so that waypoints lie inside them [-]."""
 
-
 BOX_COST = 9e-4
 """Every box costs this over its padding besides its time [rad s]: fewer boxes are better if the times are
 equal, and narrow funnels leave little tolerance for what the closed form leaves out."""
-
-K = [0.75, 0.25, 0.0, 9e-4, 0.0, 1.0, 0.0]
 
 DENSE_ENDS, SPARSE_STEP = 8, 3
 """Each of the first eight waypoints of a box is tried as its end; after them only every third one is."""
 
 LARGEST_CLEARANCE = 1.0
 """Larger clearances count as this one [m]: the object has reached its highest speed."""
-
-NARROWEST = 1e-4
-"""A box narrower than this counts as this wide where gains are scheduled [m], so that K stays finite."""
-
-CLOSED = 0.75
-"""An axis outside its goal interval reaches it in this part of the time in which its funnel closes [-]."""
-
-LEAVING_EROSION = 0.25
-"""Fraction of a goal interval, at each end, in which an axis does not leave a box [-]. It is larger than
-that of the closed loop: near an end the next funnel, which is not known yet, could not be entered."""
 
 
 @dataclass(frozen=True)
@@ -250,7 +237,7 @@ def cover_path(
         places = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points[:, :2], axis=0).T))])
         waypoints = Waypoints(
             boxes, grid, points, places, np.array(pads), goals, schedule_of(gain_set), limits,
-            least_clearance, np.array(K),
+            least_clearance,
         )  # fmt: skip
         found = _fastest_boxes(waypoints, Regions(problem, swept, pairs, CORE_FRACTION * least_clearance))
         if found is not None:
@@ -347,7 +334,6 @@ class Waypoints(NamedTuple):
     schedule: Schedule
     limits: FloatArray
     least_clearance: float
-    k: FloatArray
 
 
 @compiled
@@ -356,9 +342,10 @@ def choose_boxes(waypoints: Waypoints) -> IntArray:
 
     Each box holds some consecutive waypoints, padded by one of a few widths. For every waypoint and every
     width of the next box, the quickest sequence of boxes that ends there is kept: its time is that of the
-    sequence to where its last box begins, plus the time of that box, the longer one of those of the object
-    and of the axes. A box is swept only if it may be quicker than what is known; the object's time in it is
-    not shorter than in the same box that ends before.
+    sequence to where its last box begins, plus the time of that box: the longer one of those that the object
+    needs at the governor's steady speed and the axes need to close their funnels. A box is swept only if it
+    may be quicker than what is known, where the object is taken to need no less time than in the same box
+    that ends before.
 
     Args:
         waypoints: The waypoints.
@@ -382,7 +369,7 @@ def choose_boxes(waypoints: Waypoints) -> IntArray:
             if j - i > DENSE_ENDS and (j - i) % SPARSE_STEP != 0 and j + 1 < n:
                 continue
             for p in range(count):
-                begun = time[i, p] + waypoints.k[3] / waypoints.pads[p] + waypoints.k[2]
+                begun = time[i, p] + BOX_COST / waypoints.pads[p]
                 if not begun + travel[i, p] < time[j, :nexts].max():
                     continue
                 for a in range(m):
@@ -403,8 +390,7 @@ def choose_boxes(waypoints: Waypoints) -> IntArray:
                             low = waypoints.path[j, 2 + a] - waypoints.pads[q]
                             high = waypoints.path[j, 2 + a] + waypoints.pads[q]
                         goals[0, a], goals[1, a] = max(lower[a], low), min(upper[a], high)
-                    tc = _closing(waypoints, i, lower, upper, goals)
-                    reached = begun + max(travel[i, p], tc) + waypoints.k[4] * min(travel[i, p], tc)
+                    reached = begun + max(travel[i, p], _closing(waypoints, i, lower, upper, goals))
                     if reached < time[j, q]:
                         time[j, q] = reached
                         before[j, q, 0], before[j, q, 1] = i, p
@@ -427,19 +413,19 @@ def _travel(waypoints: Waypoints, i: int, j: int, clearances: FloatArray) -> flo
         j: The last one.
         clearances: Clearance at the waypoints in the box, shape (j - i + 1,) [m].
     """
-    stiffness, damping, gain = scheduled_governor(waypoints.schedule, max(clearances.min(), NARROWEST))
+    stiffness, damping, gain = scheduled_governor(waypoints.schedule, clearances.min())
     per_speed = steady_clearance(1.0, stiffness, damping, gain)
     fastest, seconds = min(gain * FIELD_SPEED, waypoints.limits[0]), 0.0
     for k in range(j - i):
         clearance = 0.5 * (clearances[k] + clearances[k + 1])
         length = waypoints.places[i + k + 1] - waypoints.places[i + k]
-        seconds += length / min(waypoints.k[5] * clearance / per_speed, fastest)
+        seconds += length / min(clearance / per_speed, fastest)
     return seconds
 
 
 @compiled
 def _closing(waypoints: Waypoints, i: int, lower: FloatArray, upper: FloatArray, goals: FloatArray) -> float:
-    """Time in which the axes reach their goal intervals, most of the time that their funnels close in [s].
+    """Time in which the funnels of the axes close that are not in their goal intervals already [s].
 
     Args:
         waypoints: The waypoints.
@@ -453,11 +439,11 @@ def _closing(waypoints: Waypoints, i: int, lower: FloatArray, upper: FloatArray,
         narrowest = min(narrowest, goals[1, a] - goals[0, a])
     for a in range(len(lower)):
         resting = waypoints.path[i, 2 + a]
-        if interval_margin(resting, goals[0, a], goals[1, a], waypoints.k[1]) >= 0.0:
+        if interval_margin(resting, goals[0, a], goals[1, a]) >= 0.0:
             continue
         rate = scheduled_axis(
             waypoints.schedule, a > 0, lower[a], upper[a], goals[0, a], goals[1, a], resting, narrowest,
             waypoints.limits[1 + a], np.inf,
         )[0]  # fmt: skip
-        longest = max(longest, waypoints.k[0] * CLOSING / rate)
+        longest = max(longest, CLOSING / rate)
     return longest

@@ -40,8 +40,6 @@ USERS = {
     "named": MOTION | READINESS | {"wrench_share", "acceleration_at", "object_twist", "robot_effort"},
     "compiled": MOTION | READINESS | {"wrench_share", "acceleration_at", "object_twist", "robot_effort"},
     "estimate": MOTION | READINESS,
-    # The next box is not known, so that the energy of its funnels is no condition.
-    "boxes": MOTION | READINESS - {"funnel_margin"},
     "stall": {"energy_margin", "tracking_energy", "axis_bounds", "track_axis"} | READINESS,
 }
 """What must change with a law."""

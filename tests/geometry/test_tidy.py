@@ -8,7 +8,6 @@ from shapely import Point, Polygon, box
 
 from coop_drake.errors import GeometryError
 from coop_drake.geometry import BoundaryDistance, PassageFinder, sharpest_angle, tidy_cell
-from coop_drake.geometry.simplify import _route, _serves
 from tests.support.channels import untidy_cell
 from tests.support.shapes import floors_with_ends
 
@@ -41,17 +40,7 @@ def test_a_tidy_cell_is_inside_whole_and_joins_the_ends(floor_with_ends):
     assert not tidied.interiors
     for end in ends:
         assert BoundaryDistance(tidied)(end) > 0.0
-    assert PassageFinder(tidied).find(*ends).clearance >= 0.4 * PassageFinder(safe).find(*ends).clearance
-
-
-def test_a_cell_without_the_known_passage_serves_where_another_one_is_wide_enough():
-    room = box(0, 0, 4, 3).difference(box(1.5, 1, 2.5, 1.6))
-    ends = [np.array([0.5, 1.3]), np.array([3.5, 1.3])]
-    route = _route(room, ends)
-    assert route.path.bounds[3] < 1.4  # It leads below the pillar.
-    cell = room.difference(box(1.9, 0, 2.1, 1))
-    assert _serves(cell, room, ends, route)
-    assert not _serves(cell.difference(box(1.9, 1.8, 2.1, 3)), room, ends, route)
+    assert PassageFinder(tidied).find(*ends).clearance >= 0.79 * PassageFinder(safe).find(*ends).clearance
 
 
 @given(floors_with_ends())

@@ -1,17 +1,18 @@
 """Paths covered with other boxes: free, overlapping, faster, and never used without a proof."""
 
 from dataclasses import replace
+from itertools import combinations, pairwise, product
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from coop_drake.planning.box_crossing import cross_box, object_motion, soonest_exit
 from shapely import Point
 
 from coop_drake.answers.plan_file import check_plan
 from coop_drake.laws import FixedGains, ScheduledGains, transition_gains
 from coop_drake.laws.gain_schedule import schedule_of
-from coop_drake.planning import make_plan, plan_time
-from coop_drake.planning.cell_selection import cover_path, quickest_plan
+from coop_drake.planning import cell_selection, make_plan, plan_time
+from coop_drake.planning.cell_selection import Waypoints, cover_path, quickest_plan
 from coop_drake.planning.cells.cells import CellMaker
 from coop_drake.planning.duration import speed_per_clearance
 from coop_drake.planning.search import find_channel
@@ -96,24 +97,55 @@ def test_what_cannot_be_proved_is_not_used(base, monkeypatch):
     assert [cell.tidied.wkb for cell in plan.cells] == [cell.tidied.wkb for cell in own.cells]
 
 
-def test_a_long_aisle_is_crossed_at_the_governors_speed():
-    schedule = schedule_of(ScheduledGains())
-    places, room = np.linspace(0.0, 10.0, 6), np.full(6, 0.2)
+@pytest.mark.parametrize("limit", [np.inf, 0.3])
+def test_a_long_aisle_takes_the_time_of_the_governors_speed_or_of_the_limit(limit):
+    schedule, places = schedule_of(ScheduledGains()), np.linspace(0.0, 10.0, 6)
+    asked = SimpleNamespace(schedule=schedule, places=places, limits=np.array([limit]))
     lower, upper = np.array([-0.1]), np.array([0.1])
-    state = np.zeros(5)
-    motion = object_motion(state, places, room, schedule, np.inf, 0.0, np.empty((3_000, 3)))
-    goals = np.array([lower, upper])
-    seconds = cross_box(state, motion, lower, upper, goals, np.zeros(1), schedule, np.full(1, np.inf), 60.0)
     gains = transition_gains(
         ScheduledGains(), clearance=0.2, slice_lower=lower, slice_upper=upper,
         goal_lower=lower, goal_upper=upper, resting=np.zeros(1),
     )  # fmt: skip
-    assert seconds == pytest.approx(10.0 / (speed_per_clearance(gains) * 0.2), rel=0.1)
-    assert 9.8 < state[2] <= 10.0
-    # The axis rests where it may leave the box: only the object takes time.
-    assert soonest_exit(motion, 60.0) == seconds
-    assert soonest_exit(motion, seconds - 0.1) == np.inf
-    known = motion.states[: motion.known[0]].copy()
-    motion = object_motion(np.zeros(5), places, room, schedule, np.inf, 0.0, np.empty((3_000, 3)))
-    assert soonest_exit(motion, 60.0) == seconds
-    np.testing.assert_array_equal(motion.states[: motion.known[0]], known)
+    speed = min(speed_per_clearance(gains) * 0.2, limit)
+    assert cell_selection._travel.py_func(asked, 0, 5, np.full(6, 0.2)) == pytest.approx(10.0 / speed)
+
+
+def test_the_boxes_chosen_are_the_quickest_of_all_sequences(monkeypatch):
+    """Every sequence of boxes along seven waypoints of two angles, whose boxes are free as a table says."""
+    random = np.random.default_rng(5)
+    path = np.column_stack([np.arange(7.0), np.zeros(7), random.normal(0.0, 0.3, (7, 2)).cumsum(axis=0)])
+    pads, free = np.array([0.02, 0.1]), random.random((7, 7)) < 0.7
+    clearances_of = lambda boxes, grid, lower, upper, path, i, j, most: (  # noqa: E731
+        np.full(j - i + 1, 0.5 / (j - i)) if free[i, j] or j == i + 1 else np.empty(0)
+    )
+    monkeypatch.setattr(cell_selection, "clearances_in_box", clearances_of)
+    travel, closing = cell_selection._travel.py_func, cell_selection._closing.py_func
+    monkeypatch.setattr(cell_selection, "_travel", travel)
+    monkeypatch.setattr(cell_selection, "_closing", closing)
+    waypoints = Waypoints(
+        SimpleNamespace(lower=np.full(2, -9.0), upper=np.full(2, 9.0)), None, path, path[:, 0], pads,
+        np.array([path[-1, 2:] - 0.1, path[-1, 2:] + 0.1]), schedule_of(ScheduledGains()), np.full(3, np.inf),
+        0.01,
+    )  # fmt: skip
+
+    def seconds(ends, widths):
+        total = 0.0
+        for k, (i, j) in enumerate(pairwise(ends)):
+            clearances = clearances_of(None, None, None, None, path, i, j, 1.0)
+            if len(clearances) == 0:
+                return np.inf
+            held, pad = path[i : j + 1, 2:], pads[widths[k]]
+            lower, upper = held.min(axis=0) - pad, held.max(axis=0) + pad
+            around = (
+                waypoints.goals if j == 6 else path[j, 2:] + pads[widths[k + 1]] * np.array([[-1.0], [1.0]])
+            )
+            goals = np.array([np.maximum(lower, around[0]), np.minimum(upper, around[1])])
+            times = travel(waypoints, i, j, clearances), closing(waypoints, i, lower, upper, goals)
+            total += max(times) + cell_selection.BOX_COST / pad
+        return total
+
+    between = [c for size in range(6) for c in combinations(range(1, 6), size)]
+    sequences = [([0, *c, 6], w) for c in between for w in product(range(2), repeat=len(c) + 1)]
+    rows = cell_selection.choose_boxes.py_func(waypoints)
+    chosen = seconds([0, *rows[:, 1].tolist()], rows[:, 2].tolist())
+    assert chosen == pytest.approx(min(seconds(*sequence) for sequence in sequences))

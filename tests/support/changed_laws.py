@@ -9,7 +9,6 @@ from dataclasses import replace
 from types import FunctionType
 
 import numpy as np
-from coop_drake.planning.box_crossing import cross_box, object_motion
 
 from coop_drake.answers.plan import Plan
 from coop_drake.compiled_loop import CompiledTransport, prepare
@@ -19,9 +18,7 @@ from coop_drake.compiled_loop.running import departures_of, memory_of
 from coop_drake.compiled_loop.watching import begin_figures, watch
 from coop_drake.diagram import build_closed_loop
 from coop_drake.geometry.polygons import edges_of
-from coop_drake.laws import ScheduledGains
 from coop_drake.laws.axis_table import axis_table
-from coop_drake.laws.gain_schedule import schedule_of
 from coop_drake.planning.duration import cross_cell
 from coop_drake.plant import set_configuration
 from coop_drake.scenario import Deployment
@@ -112,17 +109,6 @@ def estimated(plan: Plan):
     return np.array([*state, seconds])
 
 
-def crossed():
-    """The state in which the choice of boxes leaves a box."""
-    state, axis, schedule = np.zeros(5), np.array([0.0]), schedule_of(ScheduledGains())
-    motion = object_motion(
-        state, np.array([0.0, 0.5]), np.array([0.2, 0.2]), schedule, np.inf, 0.0, np.empty((300, 3))
-    )
-    goals = np.array([axis + 0.1, axis + 0.4])
-    seconds = cross_box(state, motion, axis - 0.5, axis + 0.5, goals, axis, schedule, axis + np.inf, 5.0)
-    return np.array([*state, seconds])
-
-
 def compiled_results(transport: CompiledTransport):
     """All that the compiled loop computes at a sample: of a team that moves, and of one that is ready."""
     plan, deployment = transport.plan, transport.scenario.deployment
@@ -162,7 +148,6 @@ def main(names: list[str]) -> None:
     results = {
         "named": lambda: named.numbers().tolist(),
         "estimate": lambda: estimated(plan).tolist(),
-        "boxes": lambda: crossed().tolist(),
         "compiled": lambda: compiled_results(transport),
         "stall": lambda: stalled(plan, sample),
     }
