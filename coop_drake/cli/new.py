@@ -173,7 +173,7 @@ def _refuse_blocked_goal(problem: PlanningProblem, path: Path) -> None:
     """Refuse a goal at which the team is proved to be in collision, whatever its free joints are."""
     from coop_drake.answers.problem import at_goal
     from coop_drake.errors import ScenarioError
-    from coop_drake.planning.blocked_goal import blocked_goal
+    from coop_drake.planning.proofs import blocked_goal
     from coop_drake.plant.placement import collisions
 
     if blocked_goal(problem)[0] is None:

@@ -1,6 +1,5 @@
 from .field import Streamlines, VelocityField, trace_streamlines
-from .harmonic_map import HarmonicMap, MapAccuracy
-from .store import MapStore
+from .harmonic_map import HarmonicMap, MapAccuracy, MapStore
 
 TOLERANCE: float
 

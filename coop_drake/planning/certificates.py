@@ -19,7 +19,7 @@ from coop_drake.geometry.minkowski import FreeSpace, shared, to_polygon
 from coop_drake.geometry.polygons import parts_of
 from coop_drake.geometry.swept_tree import BodyPair, BodyPairs, Interval, Intervals, SweptTree
 from coop_drake.planning.cells.cells import CellMaker, Region, regions_of
-from coop_drake.planning.cells.slices import Slices
+from coop_drake.planning.cells.graph import Slices
 from coop_drake.tree.component_tree import ComponentTree
 from coop_drake.tree.pose import FloatArray
 

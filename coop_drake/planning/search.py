@@ -23,7 +23,6 @@ from coop_drake.answers.problem import PlanningProblem
 from coop_drake.errors import GeometryError, PatienceError, PlanError
 from coop_drake.geometry.minkowski import to_polygon
 from coop_drake.geometry.swept_tree import BodyPairs, SweptTree
-from coop_drake.planning.blocked_goal import blocked_goal, touch_at_goal
 from coop_drake.planning.cells.as_printed import PaperExploration
 from coop_drake.planning.cells.cells import CellMaker, FreeBox
 from coop_drake.planning.cells.exploration import Exploration, ExplorationResult, Subdivision, Verdict, Watch
@@ -35,7 +34,7 @@ from coop_drake.planning.channel import (
     make_channel,
     middle_of,
 )
-from coop_drake.planning.proofs import Proofs, clearance_bound, refuted_at_an_end
+from coop_drake.planning.proofs import Proofs, blocked_goal, clearance_bound, refuted_at_an_end, touch_at_goal
 from coop_drake.planning.questions import (
     check_question,
     goal_beyond_limits,

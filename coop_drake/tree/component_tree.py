@@ -59,8 +59,8 @@ class TreeJoint:
       ``tree/levers.py``; ``geometry/sweeps.py`` and ``swept_tree.py`` (over-sweeps),
       ``geometry/sweeps.py`` (under-sweeps);
     - to the control laws: ``laws/robot_dynamics.py`` (velocities and forces);
-    - to the planner: ``answers/problem.py`` (room beyond limits), ``planning/cells/splitting.py``
-      (``finest_widths``), ``planning/rescaling.py`` and ``diagnosis/changes.py``;
+    - to the planner: ``answers/problem.py`` (room beyond limits), ``planning/cells/exploration.py``
+      (``finest_widths``), ``planning/rescaling.py`` and ``diagnosis/diagnosing.py``;
     - to the budget of a deployment: ``scenario/budget_file.py`` (errors of velocities);
     - independently of all these to ``checking/team.py``, and in ``verification/`` to ``question.py``,
       ``solids.py``, ``speeds.py`` and ``runs/placement.py``, ``mechanics.py`` and ``speeds.py``.

@@ -9,8 +9,7 @@ from coop_drake.tuning.objective import (
     RunOutcome,
     read_weights,
 )
-from coop_drake.tuning.search import Parameter, Search, search, tunable_parameters
-from coop_drake.tuning.trials import TrialRunner, Workers
+from coop_drake.tuning.search import Parameter, Search, TrialRunner, Workers, search, tunable_parameters
 
 __all__ = [
     "CRITERIA",

@@ -9,12 +9,10 @@ from shapely import box, union_all
 
 from coop_drake.answers import PlannerSettings, PlanningProblem
 from coop_drake.diagnosis import Answer, diagnose, diagnosing, diagnosis_figure, facts_of, sentences_of
-from coop_drake.diagnosis import changes as relaxations
-from coop_drake.diagnosis.changes import changes, try_changes
+from coop_drake.diagnosis import diagnosing as relaxations
 from coop_drake.diagnosis.contacts import colliding_stretches
-from coop_drake.diagnosis.diagnosing import SLICES, find_passages
-from coop_drake.diagnosis.variants import BudgetedPlanner, on_open_floor
-from coop_drake.diagnosis.widening import WidenedFloor
+from coop_drake.diagnosis.diagnosing import SLICES, changes, find_passages, try_changes
+from coop_drake.diagnosis.variants import BudgetedPlanner, WidenedFloor, on_open_floor
 from coop_drake.drawing import save_figure
 from coop_drake.planning import Channel, find_channel
 from coop_drake.tree.component_tree import Body, Component, ComponentTree, TreeJoint

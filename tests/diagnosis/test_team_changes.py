@@ -6,7 +6,7 @@ from math import pi
 import pytest
 from shapely import union_all
 
-from coop_drake.diagnosis.changes import changes, shrunk_bodies, widened_joints
+from coop_drake.diagnosis.diagnosing import changes, shrunk_bodies, widened_joints
 from coop_drake.tree.component_tree import Body, Component, ComponentTree
 from tests.planning.test_continuous_joints import turret
 from tests.support.cases import disc, rectangle

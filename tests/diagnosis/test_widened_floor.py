@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from shapely import LineString, Point, box, union_all
 
-from coop_drake.diagnosis.widening import WidenedFloor
+from coop_drake.diagnosis.variants import WidenedFloor
 
 INSIDE = np.array([0.5, 0.5])
 THICKNESS = 0.1

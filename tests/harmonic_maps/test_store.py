@@ -72,7 +72,7 @@ def test_another_question_is_another_map(store):
 
 def test_other_code_is_another_map(store, monkeypatch):
     store.map_of(*domains.square(), tolerance=TOLERANCE)
-    monkeypatch.setattr("coop_drake.harmonic_maps.store._code", lambda: b"later")
+    monkeypatch.setattr("coop_drake.harmonic_maps.harmonic_map._code", lambda: b"later")
     store.map_of(*domains.square(), tolerance=TOLERANCE)
     assert (store.found, len(store.files())) == (0, 2)
 

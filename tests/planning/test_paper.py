@@ -19,8 +19,7 @@ from coop_drake.planning.cells.exploration import (
     SliceSplit,
     Verdict,
 )
-from coop_drake.planning.cells.graph import CellGraph, GraphCell, Kind
-from coop_drake.planning.cells.slices import Slices
+from coop_drake.planning.cells.graph import CellGraph, GraphCell, Kind, Slices
 from tests.planning.test_search import rod_problem
 from tests.support.cases import team_tree, transport
 

@@ -13,11 +13,10 @@ from benchmarks.planner.family import corridor_floor, corridor_problem, shelf_pr
 from coop_drake.answers import Infeasible, PlanningProblem
 from coop_drake.laws import ScheduledGains
 from coop_drake.planning import find_channel
-from coop_drake.planning.blocked_goal import blocked_goal
 from coop_drake.planning.cells.cells import Squeezes
 from coop_drake.planning.cells.exploration import Exploration, Verdict
 from coop_drake.planning.planner import plan
-from coop_drake.planning.proofs import MANY_CORNERS, Proofs, clearance_bound, refuted_at_an_end
+from coop_drake.planning.proofs import MANY_CORNERS, Proofs, blocked_goal, clearance_bound, refuted_at_an_end
 from coop_drake.planning.questions import relaxed
 from coop_drake.planning.sampling.sampler import inscribed_disc
 from coop_drake.tree.component_tree import Body, Component, ComponentTree, ConvexShape, TreeJoint

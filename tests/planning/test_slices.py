@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from coop_drake.geometry.swept_tree import Intervals
-from coop_drake.planning.cells.slices import Slices, holds, interval_overlap
+from coop_drake.planning.cells.graph import Slices, holds, interval_overlap
 from coop_drake.planning.channel import unwrapped
 from coop_drake.tree.component_tree import ComponentTree
 from tests.support.cases import team_tree

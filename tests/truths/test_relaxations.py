@@ -7,10 +7,10 @@ import pytest
 from hypothesis import HealthCheck, Phase, given, settings
 
 from coop_drake.answers.problem import PlannerSettings, PlanningProblem
-from coop_drake.planning.blocked_goal import blocked_goal
 from coop_drake.planning.cells.exploration import Exploration, Verdict
 from coop_drake.planning.cells.graph import Kind
 from coop_drake.planning.channel import Channel
+from coop_drake.planning.proofs import blocked_goal
 from coop_drake.planning.questions import relaxed
 from coop_drake.planning.search import find_channel
 from tests.support.cases import case

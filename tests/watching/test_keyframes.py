@@ -10,8 +10,7 @@ import pytest
 from shapely import LineString, union_all
 
 from coop_drake.geometry.minkowski import to_polygon
-from coop_drake.planning.cells.graph import Kind
-from coop_drake.planning.cells.slices import holds, share_facet
+from coop_drake.planning.cells.graph import Kind, holds, share_facet
 from coop_drake.tree.component_tree import nearest_turn
 from coop_drake.watching import keyframes, record_search
 from coop_drake.watching.keyframes import THETA, layers, on_turn, projection_of
