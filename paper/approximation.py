@@ -11,8 +11,7 @@ import numpy as np
 from shapely import MultiPoint, Polygon, union_all
 from shapely.geometry.base import BaseGeometry
 
-from coop_drake.geometry.swept_tree import Intervals
-from coop_drake.geometry.swept_tree import SweptTree
+from coop_drake.geometry.swept_tree import Intervals, SweptTree
 from coop_drake.tree.component_tree import ComponentTree
 from coop_drake.tree.pose import FloatArray
 
