@@ -13,8 +13,9 @@ import numpy as np
 from shapely import Polygon
 
 from coop_drake.errors import GeometryError
-from coop_drake.geometry.polygons import edges_of
-from coop_drake.simulation.step_kernels import team_distances
+from coop_drake.geometry.distances import meets_ring, ring_holds, squared_distance, squared_ring_distance
+from coop_drake.geometry.polygons import edges_of, signed_distance
+from coop_drake.jit import compiled
 from coop_drake.tree.component_tree import ComponentTree
 from coop_drake.tree.pose import FloatArray, IntArray
 from coop_drake.tree.team_arrays import TeamArrays, moved, place_into

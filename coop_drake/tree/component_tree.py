@@ -56,8 +56,7 @@ class TreeJoint:
     - to its plant: ``plant/chain.py`` (``MOVABLE``, which refuses all other kinds), ``component_tree.py``,
       ``planarity.py``, ``joint_survey.py``, ``fixing.py`` and ``planar_chain.py``, all in ``plant/``;
     - to its geometry: ``unit`` below, ``ComponentTree.reach``, ``tree/team_arrays.py`` (its pose) and
-      ``tree/levers.py``; ``geometry/sweeps.py`` and ``swept_tree.py`` (over-sweeps),
-      ``geometry/sweeps.py`` (under-sweeps);
+      ``tree/component_tree.py``; ``geometry/sweeps.py`` and ``swept_tree.py``;
     - to the control laws: ``laws/robot_dynamics.py`` (velocities and forces);
     - to the planner: ``answers/problem.py`` (room beyond limits), ``planning/cells/exploration.py``
       (``finest_widths``), ``planning/rescaling.py`` and ``diagnosis/diagnosing.py``;

@@ -11,8 +11,7 @@ from typing import TYPE_CHECKING
 
 from coop_drake.geometry.swept_tree import Interval, Intervals
 from coop_drake.planning.cells.cells import Region
-from coop_drake.tree.component_tree import nearest_turn
-from coop_drake.tree.component_tree import ComponentTree
+from coop_drake.tree.component_tree import ComponentTree, nearest_turn
 
 if TYPE_CHECKING:
     from networkx import Graph
