@@ -4,13 +4,12 @@ from dataclasses import replace
 
 import pytest
 
-from benchmarks.one_process import DirectExchange, simulate_apart
-from coop_drake.apart.messages import Ready, Switch
+from benchmarks.one_process import simulate_apart
 from coop_drake.diagram import control_period
 from coop_drake.errors import ScenarioError
 from coop_drake.scenario import Control, Deployment, Hold, Measurements, Messages, RobotDepartures, Silence
 from coop_drake.scenario.deployment import ActuatorLimits, Deafness
-from coop_drake.simulation import communication, simulate
+from coop_drake.simulation import simulate
 from tests.support.same_runs import differences
 from tests.support.small_loop import small_maps, small_problem
 
@@ -49,17 +48,6 @@ def test_the_log_is_that_of_the_closed_loop(case):
     apart = simulate_apart(scenario, plan, small_maps())
     assert together.reached
     assert differences(together, apart) == []
-
-
-def test_as_many_messages_cross_as_the_summary_counts():
-    scenario, plan = small_problem("base")
-    scenario, exchange = replace(scenario, deployment=Deployment(control_rate=100.0)), DirectExchange()
-    counted = communication(simulate_apart(scenario, plan, small_maps(), exchange=exchange))
-    senders = [sender for _, sender, message in exchange.messages if isinstance(message, Ready)]
-    assert [senders.count(k) for k in range(2)] == [*counted.reports]
-    switches = [message for _, _, message in exchange.messages if isinstance(message, Switch)]
-    assert [switch.cell for switch in switches] == [*range(1, len(plan.cells))]
-    assert len(switches) * 2 == counted.announcements
 
 
 @pytest.mark.parametrize(

@@ -80,6 +80,8 @@ def test_a_run_is_that_of_one_process_with_as_many_messages_of_the_team():
     assert sent == [*counted.reports, counted.announcements]
     said = [2 if sender is None else 1 for _, sender, _ in direct.messages]
     assert sum(said) == sum(sent) == counted.messages
+    cells = [message.cell for _, sender, message in direct.messages if sender is None]
+    assert cells == [*range(1, len(problem[1].cells))]
 
 
 @pytest.mark.slow

@@ -1,4 +1,4 @@
-"""Measurements say when they were made: robots and drives compare this with what the plan holds for."""
+"""Measurements say when they were made; a team whose drives brake within its budget rests where it may."""
 
 from dataclasses import replace
 
@@ -6,12 +6,16 @@ import numpy as np
 import pytest
 
 from benchmarks.one_process import DirectExchange, simulate_apart
+from coop_drake.answers import load_plan
 from coop_drake.answers.budget import Budget
 from coop_drake.apart.robot import StampCheck, certified_age
+from coop_drake.cli.task import read_task
 from coop_drake.scenario import Measurements
-from tests.apart.test_stops_under_a_budget import transport  # noqa: F401
+from coop_drake.simulation import build_maps
+from tests.support.cli import invoke
 from tests.support.same_runs import differences
 from tests.support.sampled_team import sampled
+from tests.support.scenarios import write_scenario
 from tests.support.small_loop import small_maps
 
 T = 0.005
@@ -69,6 +73,38 @@ def test_a_clock_that_jumps_is_seen_by_the_numbers_of_samples(times, jumps):
     assert doubts == [False, False, jumps]
 
 
+@pytest.fixture(scope="module")
+def transport(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("stops")
+    file = folder / "room.scenario.yaml"
+    goal = {"object": {"x": 4.5, "y": 2.0, "theta": 3.0}}
+    write_scenario(file, goal=goal, deployment={"preset": "mobile_base", "budget": "all"})
+    result = invoke("plan", file, "--out", folder)
+    assert result.exit_code == 0, result.output
+    task, plan = read_task(file), load_plan(folder / "plan.json")
+    maps = build_maps(plan, tolerance=task.scenario.maps.tolerance)
+    return task.scenario, plan, maps
+
+
+@pytest.mark.no_cover
+@pytest.mark.slow
+def test_whenever_the_drives_brake_the_team_rests_where_it_can_begin_a_cell_anew(transport):
+    scenario, plan, maps = transport
+    gaps = [(round(begin * 200), round(begin * 200) + 60) for begin in (0.8, 3.8, 8.0)]
+    exchange = DirectExchange(gaps)
+    log = simulate_apart(scenario, plan, maps, exchange=exchange)
+    stops = exchange.membership.stops
+    assert log.reached, log.violation
+    assert len(stops) == 3
+    assert all(stop.certified for stop in stops)
+    follows = np.ones(len(log.times), dtype=bool)
+    for stop in stops:
+        follows &= (log.times < stop.since) | (log.times > stop.resumed)
+    for name in ("funnel_margin", "slice_margin", "cell_clearance"):
+        assert getattr(log, name)[follows].min() > 0.0
+    assert min(log.workspace_clearance.min(), log.body_clearance.min()) > 0.0
+
+
 class Watching(DirectExchange):
     """Keeps the time and the stamps of robot 0 at every sample."""
 
@@ -121,8 +157,8 @@ class LateExchange(DirectExchange):
 
 
 @pytest.mark.slow
-def test_a_team_whose_measurements_come_later_than_its_plan_allows_rests_and_says_why(transport):  # noqa: F811
-    scenario, plan, maps, _ = transport
+def test_a_team_whose_measurements_come_later_than_its_plan_allows_rests_and_says_why(transport):
+    scenario, plan, maps = transport
     exchange = LateExchange(0.8, 3)
     log = simulate_apart(scenario, plan, maps, exchange=exchange)
     assert not log.reached
@@ -133,8 +169,8 @@ def test_a_team_whose_measurements_come_later_than_its_plan_allows_rests_and_say
     assert np.abs(log.object_twist[-1]).max() < 0.05
 
 
-def test_a_clock_that_is_more_wrong_than_the_plan_allows_is_seen_at_once(transport):  # noqa: F811
-    scenario, plan, maps, _ = transport
+def test_a_clock_that_is_more_wrong_than_the_plan_allows_is_seen_at_once(transport):
+    scenario, plan, maps = transport
     wrong = replace(scenario, deployment=replace(scenario.deployment, clock_error=0.002))
     log = simulate_apart(wrong, plan, maps)
     assert not log.reached
@@ -154,8 +190,8 @@ class Hurried(DirectExchange):
             own.step = right
 
 
-def test_a_clock_that_is_wrong_within_the_budget_changes_no_nominal_motion(transport):  # noqa: F811
-    scenario, plan, maps, _ = transport
+def test_a_clock_that_is_wrong_within_the_budget_changes_no_nominal_motion(transport):
+    scenario, plan, maps = transport
     scenario = replace(scenario, simulator=replace(scenario.simulator, max_time=1.0))
     allowed = replace(plan, budget=replace(plan.budget, clock_error=2e-4))
     logs = [simulate_apart(scenario, allowed, maps, exchange=one()) for one in (DirectExchange, Hurried)]
