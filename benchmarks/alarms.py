@@ -17,9 +17,9 @@ from coop_drake import Found, build_maps, load_scenario, plan
 from coop_drake.answers.plan import Plan
 from coop_drake.compiled_loop import prepare, run
 from coop_drake.errors import PlanError
-from coop_drake.laws.departure import unseen_time
-from coop_drake.laws.nominal_axes import lag_factors
-from coop_drake.laws.sampling import whole_periods
+from coop_drake.laws.measurements import whole_periods
+from coop_drake.laws.nominal import lag_factors
+from coop_drake.laws.readiness import unseen_time
 from coop_drake.scenario import Scenario
 from coop_drake.scenario.budget_file import DEVIATIONS, GRASP_DEVIATIONS, PLANE_DEVIATIONS
 

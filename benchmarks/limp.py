@@ -19,7 +19,7 @@ from coop_drake.apart.messages import SUPERVISOR
 from coop_drake.apart.node import Stillness
 from coop_drake.diagram import brakes_of, build_station, control_period
 from coop_drake.harmonic_maps import HarmonicMap
-from coop_drake.laws.braking import braking_effort
+from coop_drake.laws.actuators import braking_effort
 from coop_drake.scenario import Control, Floor, Hold, Scenario
 from coop_drake.tree.pose import FloatArray
 

@@ -17,7 +17,7 @@ from coop_drake.apart.supervisor import SupervisorNode
 from coop_drake.diagram import brakes_of, build_world, control_period
 from coop_drake.diagram.knowledge import hold_of, robot_knowledge
 from coop_drake.harmonic_maps import HarmonicMap
-from coop_drake.laws.braking import Brake, braking_effort
+from coop_drake.laws.actuators import Brake, braking_effort
 from coop_drake.scenario import Scenario
 from coop_drake.simulation import Sample, run_loop
 from coop_drake.tree.pose import FloatArray

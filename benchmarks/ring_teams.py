@@ -15,7 +15,7 @@ from coop_drake.errors import PlanError
 from coop_drake.harmonic_maps import HarmonicMap
 from coop_drake.planning.planner import plan
 from coop_drake.plant import build_team_plant, planning_problem
-from coop_drake.plant.polygon_body import polygon_body_files, write_polygon_body
+from coop_drake.plant.model_writing import polygon_body_files, write_polygon_body
 from coop_drake.scenario import Scenario, load_scenario
 from coop_drake.simulation import build_maps
 

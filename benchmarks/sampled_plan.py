@@ -10,11 +10,11 @@ from coop_drake.answers.budget import Budget
 from coop_drake.answers.plan import Plan
 from coop_drake.jit import compiled
 from coop_drake.laws.axis_table import FADING_TIME, LEAVING_TIME, axis_table, bounds_of, rest_jump, track_row
-from coop_drake.laws.hand_over import fading
-from coop_drake.laws.nominal_axes import carry_axes as carry_nominal
-from coop_drake.laws.nominal_axes import lag_factors, pulled_axis
+from coop_drake.laws.measurements import whole_periods
+from coop_drake.laws.nominal import carry_axes as carry_nominal
+from coop_drake.laws.nominal import lag_factors, pulled_axis
+from coop_drake.laws.ppc import fading
 from coop_drake.laws.readiness import axis_ready
-from coop_drake.laws.sampling import whole_periods
 from coop_drake.tree.pose import FloatArray
 
 HELD, SLOWEST = 0.5, 6.0

@@ -58,7 +58,7 @@ def plan(
     if isinstance(question, PlanningProblem):
         return ask(question, ScheduledGains(), gain_set_name=_SCHEDULED)
     from coop_drake.plant import planning_problem
-    from coop_drake.plant.budgets import budget_of
+    from coop_drake.plant.facts import budget_of
     from coop_drake.scenario import with_gains
 
     scenario = with_gains(question, gains)
@@ -95,7 +95,7 @@ def verify(
     problem, gain_sets = _problem_and_gains(question)
     budgets = None
     if not isinstance(question, PlanningProblem):
-        from coop_drake.plant.budgets import scenario_budgets
+        from coop_drake.plant.facts import scenario_budgets
 
         budgets = scenario_budgets(question, problem)
     if isinstance(answer, Path | str):
@@ -137,7 +137,7 @@ def verify_run(
     from coop_drake.answers.log import SimulationLog
     from coop_drake.answers.plan_file import load_plan
     from coop_drake.plant import planning_problem, run_setup
-    from coop_drake.plant.budgets import scenario_budgets
+    from coop_drake.plant.facts import scenario_budgets
     from coop_drake.verification import verify_plan
     from coop_drake.verification.runs import verify_log
 
@@ -168,7 +168,7 @@ def why(question: Scenario | PlanningProblem, *, progress: Progress | None = Non
 def show(question: Scenario | PlanningProblem, plan: Plan | None = None, caption: str = "") -> Figure:
     """Draw the floor, the team at start and goal, and the cells of a plan if given, with a caption below."""
     from coop_drake.drawing import house_style
-    from coop_drake.viz.floor_figures import overview_figure
+    from coop_drake.viz.figures import overview_figure
 
     with house_style():
         return overview_figure(_problem_and_gains(question)[0], plan, caption)

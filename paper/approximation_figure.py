@@ -12,9 +12,8 @@ from matplotlib.figure import Figure
 from shapely import get_coordinates, union_all
 from shapely.geometry.base import BaseGeometry
 
-from coop_drake.drawing.canvas import new_figure
+from coop_drake.drawing.canvas import draw_polygon, draw_team, new_figure, team_legend
 from coop_drake.drawing.colours import BLUE, GREEN, GREY, INK
-from coop_drake.drawing.floor import draw_polygon, draw_team, team_legend
 from coop_drake.geometry.swept_tree import Interval
 from coop_drake.tree.component_tree import ComponentTree
 from coop_drake.tree.pose import FloatArray

@@ -12,9 +12,8 @@ from matplotlib.patches import Patch
 from shapely import Polygon, union_all
 
 from coop_drake.answers.problem import PlanningProblem
-from coop_drake.drawing.canvas import new_figure
+from coop_drake.drawing.canvas import draw_polygon, draw_team, draw_workspace, new_figure
 from coop_drake.drawing.colours import FLOOR, INK, PROVED_FREE, UNDECIDED
-from coop_drake.drawing.floor import draw_polygon, draw_team, draw_workspace
 from coop_drake.geometry.swept_tree import BodyPairs, Intervals, SweptTree
 from coop_drake.planning.cells.cells import CellMaker, Region
 from coop_drake.watching.pictures import draw_section

@@ -25,7 +25,7 @@ from coop_drake.answers.plan_file import plan_document, read_plan
 from coop_drake.errors import PlanError, RefusalError
 from coop_drake.planning.planner import plan
 from coop_drake.plant import planning_problem
-from coop_drake.plant.budgets import budget_of, scenario_budgets
+from coop_drake.plant.facts import budget_of, scenario_budgets
 from coop_drake.verification import verify_plan
 
 __all__ = ["judged_claims"]

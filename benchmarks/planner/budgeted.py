@@ -14,7 +14,7 @@ from benchmarks.rows import Row
 from benchmarks.tasks import Task
 from coop_drake.answers.budget import Budget
 from coop_drake.laws import ScheduledGains
-from coop_drake.plant.budgets import budget_of
+from coop_drake.plant.facts import budget_of
 
 __all__ = ["BUDGETS", "budget_tasks", "plan_with_budgets"]
 

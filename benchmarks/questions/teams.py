@@ -11,7 +11,7 @@ import numpy as np
 import shapely
 from shapely import Polygon
 
-from coop_drake.plant.starter_models import boxes_model, robot_model
+from coop_drake.plant.model_writing import boxes_model, robot_model
 
 Random = np.random.Generator
 

@@ -19,7 +19,7 @@ from coop_drake.tree.pose import FloatArray
 from coop_drake.typed_data import EXACT, NotNegative, Number, Positive, Vector
 
 if TYPE_CHECKING:
-    from coop_drake.laws.funnels import Funnel
+    from coop_drake.laws.ppc import Funnel
 
 # The work that a search did before it answered.
 
@@ -178,7 +178,7 @@ class Plan:
 
     def funnel(self, index: int) -> Funnel:
         """Return the funnels of a transition, axes (theta, q...), from cell to goal intervals."""
-        from coop_drake.laws.funnels import Funnel  # here, so that reading a plan does not load numba
+        from coop_drake.laws.ppc import Funnel
 
         cell, transition = self.cells[index], self.transitions[index]
         goal, gains = (transition.goal_lower, transition.goal_upper), transition.gains

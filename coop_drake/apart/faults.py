@@ -18,7 +18,7 @@ from coop_drake.apart.messages import (
     Telemetry,
 )
 from coop_drake.errors import ScenarioError
-from coop_drake.laws.sampling import whole_periods
+from coop_drake.laws.measurements import whole_periods
 from coop_drake.scenario.deployment import Delay, Probability
 from coop_drake.scenario.document import read_file
 from coop_drake.typed_data import Limits, NotNegative, Positive

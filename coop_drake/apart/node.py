@@ -14,9 +14,8 @@ from pydrake.systems.framework import Diagram
 from coop_drake.apart.messages import WORLD, Goodbye, Hello, Reason, RefusedError, Sample, Tick, Welcome
 from coop_drake.apart.transport import Ends
 from coop_drake.errors import MessagingError
-from coop_drake.laws.arrival import MEAN_TIME
-from coop_drake.laws.readiness import RATE_TOLERANCE
-from coop_drake.laws.sampling import whole_periods
+from coop_drake.laws.measurements import whole_periods
+from coop_drake.laws.readiness import MEAN_TIME, RATE_TOLERANCE
 from coop_drake.systems.block import release_all
 from coop_drake.tree.pose import FloatArray
 

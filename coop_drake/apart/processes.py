@@ -38,7 +38,7 @@ from coop_drake.errors import CoopDrakeError
 from coop_drake.harmonic_maps import HarmonicMap
 from coop_drake.interrupts import uninterrupted
 from coop_drake.plant import build_team_plant
-from coop_drake.plant.scenario_digest import scenario_digest
+from coop_drake.plant.facts import scenario_digest
 from coop_drake.progress import Progress
 from coop_drake.scenario import Deployment, Scenario
 from coop_drake.simulation import Sample, run_loop

@@ -50,8 +50,7 @@ from coop_drake.apart.node import (
 from coop_drake.apart.transport import Ends
 from coop_drake.diagram.deployment import deploy
 from coop_drake.diagram.robot_controller import RobotKnowledge, build_robot_controller
-from coop_drake.laws.axis_table import GOAL_LOWER, GOAL_UPPER, SLICE_LOWER, SLICE_UPPER, track_row
-from coop_drake.laws.beginning import (
+from coop_drake.laws.actuators import (
     LONGEST_RETURN,
     PULL,
     RATE,
@@ -60,10 +59,11 @@ from coop_drake.laws.beginning import (
     slow_motion,
     slow_samples,
 )
-from coop_drake.laws.chain_motion import PX, PY, motion_room, write_motion
-from coop_drake.laws.departure import BRAKES
-from coop_drake.laws.nominal_axes import place_on_axes
-from coop_drake.laws.sampling import period_of, whole_periods
+from coop_drake.laws.axis_table import GOAL_LOWER, GOAL_UPPER, SLICE_LOWER, SLICE_UPPER, track_row
+from coop_drake.laws.measurements import period_of, whole_periods
+from coop_drake.laws.nominal import place_on_axes
+from coop_drake.laws.readiness import BRAKES
+from coop_drake.laws.robot_dynamics import PX, PY, motion_room, write_motion
 from coop_drake.plant import robot_chain
 from coop_drake.plant.chain import is_circle
 from coop_drake.scenario import Deployment
@@ -145,7 +145,7 @@ class StampCheck:
 
 @dataclass(frozen=True)
 class SlowMotion:
-    """The way from a rest to the middle of the goal intervals, see ``laws/beginning.py``.
+    """The way from a rest to the middle of the goal intervals, see ``laws/actuators.py``.
 
     Attributes:
         begin: Number of the sample at which it begins.
@@ -164,7 +164,7 @@ class RobotNode:
     """Computes one robot's efforts and messages from its own measurements and what the supervisor says.
 
     While its drives brake, it stands and says where the object rests. On the supervisor's order it goes
-    slowly to where its cell's law takes over, as all others do, see ``laws/beginning.py``. Where it departs
+    slowly to where its cell's law takes over, as all others do, see ``laws/actuators.py``. Where it departs
     from its nominal motion by far more than its monitor allows, it stands at once, so that the drives brake.
 
     Sensors may show the object's angle and joints without limits in any turn: each value counts in the turn

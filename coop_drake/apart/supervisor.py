@@ -22,8 +22,8 @@ from coop_drake.apart.messages import (
 )
 from coop_drake.apart.node import AHEAD, LOSSY_COPIES, NodeProcess, SampledDiagram
 from coop_drake.apart.transport import Ends
-from coop_drake.diagram.hold import add_supervisor
-from coop_drake.laws.sampling import period_of, whole_periods
+from coop_drake.diagram.closed_loop import add_supervisor
+from coop_drake.laws.measurements import period_of, whole_periods
 from coop_drake.scenario import Hold as HoldSettings
 from coop_drake.systems import CellPlanner
 from coop_drake.tree.component_tree import whole_turns

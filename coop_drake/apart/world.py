@@ -26,7 +26,7 @@ from coop_drake.apart.messages import (
 from coop_drake.apart.node import ASKS, FOLLOWS, MOVES, RETURNS, STATES, TURN, Stillness
 from coop_drake.apart.transport import Ends, Network
 from coop_drake.errors import MessagingError
-from coop_drake.laws.braking import Brake, braking_effort
+from coop_drake.laws.actuators import Brake, braking_effort
 from coop_drake.tree.pose import FloatArray
 
 PATIENCE = 5.0

@@ -16,8 +16,7 @@ from coop_drake.errors import PlanError
 from coop_drake.files import cache_folder
 from coop_drake.harmonic_maps import HarmonicMap, MapStore
 from coop_drake.plant import planning_problem
-from coop_drake.plant.budgets import budget_of
-from coop_drake.plant.scenario_digest import models_digest
+from coop_drake.plant.facts import budget_of, models_digest
 from coop_drake.progress import Progress
 from coop_drake.scenario.budget_file import names_file
 from coop_drake.scenario.model import Scenario

@@ -174,7 +174,7 @@ def _refuse_blocked_goal(problem: PlanningProblem, path: Path) -> None:
     from coop_drake.answers.problem import at_goal
     from coop_drake.errors import ScenarioError
     from coop_drake.planning.proofs import blocked_goal
-    from coop_drake.plant.placement import collisions
+    from coop_drake.plant.problem import collisions
 
     if blocked_goal(problem)[0] is None:
         return
@@ -190,7 +190,7 @@ def _write(starter: Starter, folder: Path, reporter: Reporter, *, force: bool) -
     """Write the files beside their place, read them as a user would, and only then move them there."""
     from coop_drake.errors import ScenarioError
     from coop_drake.plant import planning_problem
-    from coop_drake.plant.starter_models import object_model, robot_model
+    from coop_drake.plant.model_writing import object_model, robot_model
     from coop_drake.scenario import load_scenario
     from coop_drake.scenario.starter import starter_text
 
@@ -264,7 +264,7 @@ def object_command(
     _check_name(name)
     with reporting(machine=machine, quiet=quiet) as reporter:
         from coop_drake.errors import ScenarioError
-        from coop_drake.plant.polygon_body import polygon_body_files, write_polygon_body
+        from coop_drake.plant.model_writing import polygon_body_files, write_polygon_body
 
         files = polygon_body_files(
             outline, mass, name, height, inertia=inertia, elevation=elevation, grasps=frames

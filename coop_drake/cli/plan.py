@@ -86,7 +86,7 @@ def answer_to(
 
     name, tolerated = task.scenario.selected_gains, None
     if budget is not None or task.scenario.deployment.budget != "none":
-        from coop_drake.plant.budgets import budget_of  # Drake, which other plans do without
+        from coop_drake.plant.facts import budget_of
 
         tolerated = budget_of(budget, task.scenario, task.problem)
         required = task.scenario.deployment.budget

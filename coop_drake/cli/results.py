@@ -11,7 +11,7 @@ from pathlib import Path
 
 from coop_drake.errors import ScenarioError
 from coop_drake.files import remove_unfinished, write_atomically
-from coop_drake.viz.figure_names import joints_figure_name
+from coop_drake.viz.drawing_processes import joints_figure_name
 
 _LARGEST_FRAME = 500
 _FILES = {

@@ -12,7 +12,7 @@ from coop_drake.cli.options import Machine, Quiet, out_folder
 from coop_drake.cli.reporter import ExitCode, Reporter, reporting
 
 if TYPE_CHECKING:
-    from coop_drake.plant.joint_survey import SurveyedJoint
+    from coop_drake.plant.importing import SurveyedJoint
 
 EXAMPLES = (
     (
@@ -87,10 +87,10 @@ def _import(
 ) -> ExitCode:
     from coop_drake.errors import ScenarioError
     from coop_drake.files import write_atomically
-    from coop_drake.plant.importing import import_robot
-    from coop_drake.plant.joint_survey import (
+    from coop_drake.plant.importing import (
         GRIPPER,
         has_gripper,
+        import_robot,
         scenario_lines,
         survey_joints,
         with_gripper,

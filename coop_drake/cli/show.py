@@ -36,7 +36,7 @@ def show_command(
         raise typer.BadParameter(f"{out} ends neither in .png nor in .svg.")
     with reporting(quiet=quiet) as reporter:
         from coop_drake.drawing import house_style, save_figure
-        from coop_drake.viz.floor_figures import overview_figure
+        from coop_drake.viz.figures import overview_figure
 
         task = read_task(scenario, reporter=reporter)
         found = None if plan is None else read_plan(task, plan, reporter)

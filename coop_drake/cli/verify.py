@@ -80,7 +80,7 @@ def _verify(
                     certificate, plan or beside, task.scenario, braked=braked, progress=progress
                 )
             else:
-                from coop_drake.plant.budgets import scenario_budgets
+                from coop_drake.plant.facts import scenario_budgets
                 from coop_drake.verification import verify_file
 
                 verified = verify_file(

@@ -47,7 +47,7 @@ def _show_plan(task: Task, folder: ResultFolder, reporter: Reporter) -> None:
     """Show the rows that `plan` shows: a channel was found, of which a plan is made; limits may refuse it."""
     from coop_drake.answers import BeyondLimits
     from coop_drake.drawing import house_style, save_figure
-    from coop_drake.viz.floor_figures import refused_figure
+    from coop_drake.viz.figures import refused_figure
 
     result = answer_to(task, reporter)
     if report_answer(task, result, None, reporter):

@@ -11,10 +11,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from coop_drake.laws.chain_motion import MOTION_COLUMNS
-from coop_drake.laws.sticking import StickingRoom, sticking_room
-from coop_drake.laws.team_dynamics import TeamWork, team_work
-from coop_drake.systems.nominal_kernels import NOMINAL_SIZE
+from coop_drake.laws.robot_dynamics import MOTION_COLUMNS
+from coop_drake.laws.team_dynamics import StickingRoom, TeamWork, sticking_room, team_work
+from coop_drake.systems.kernels import NOMINAL_SIZE
 from coop_drake.tree.pose import FloatArray, IntArray
 from coop_drake.tree.team_arrays import TeamArrays
 

@@ -17,13 +17,10 @@ from coop_drake.compiled_loop.robots import compute, read_own
 from coop_drake.compiled_loop.watching import ENDED, RUNS, left_by_all, watch
 from coop_drake.jit import compiled
 from coop_drake.laws.actuators import lag_behind, limit_efforts
-from coop_drake.laws.channels import carry_reports
-from coop_drake.laws.friction import base_friction
-from coop_drake.laws.nominal_axes import carry_axes
-from coop_drake.laws.random_draws import uniform_pair
-from coop_drake.laws.sticking import stick
-from coop_drake.laws.team_dynamics import team_accelerations
-from coop_drake.systems.nominal_kernels import step_nominal
+from coop_drake.laws.measurements import carry_reports, uniform_pair
+from coop_drake.laws.nominal import carry_axes
+from coop_drake.laws.team_dynamics import base_friction, stick, team_accelerations
+from coop_drake.systems.kernels import step_nominal
 from coop_drake.tree.pose import FloatArray
 
 BEGIN, END = 4, 5

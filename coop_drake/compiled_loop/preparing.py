@@ -15,7 +15,7 @@ from coop_drake.diagram.robot_controller import RobotKnowledge
 from coop_drake.errors import ScenarioError
 from coop_drake.geometry.polygons import BoundaryDistance
 from coop_drake.harmonic_maps import HarmonicMap, VelocityField
-from coop_drake.laws.hand_over import governed_gains
+from coop_drake.laws.ppc import governed_gains
 from coop_drake.plant import (
     TeamPlant,
     base_chain,
@@ -28,7 +28,7 @@ from coop_drake.scenario import Scenario
 from coop_drake.simulation.clearance import TeamClearance
 from coop_drake.simulation.run import patience
 from coop_drake.systems import axis_laws
-from coop_drake.systems.nominal_kernels import NOTHING
+from coop_drake.systems.kernels import NOTHING
 from coop_drake.tree.component_tree import ComponentTree, axis_levers
 from coop_drake.tree.pose import FloatArray, IntArray
 

@@ -20,19 +20,27 @@ from coop_drake.compiled_loop.arrays import (
     RobotRoom,
 )
 from coop_drake.jit import compiled
-from coop_drake.laws.arrival import arrival_margin
 from coop_drake.laws.axis_table import bounds_of, track_axes, write_jumps
-from coop_drake.laws.channels import NOTHING, carry_measurements
-from coop_drake.laws.departure import alarm_at, axis_level, largest_departure, quiet_margin
-from coop_drake.laws.load_sharing import end_effector_command
-from coop_drake.laws.measurement_errors import shift_back, write_errors
-from coop_drake.laws.nominal_axes import carry_axes, place_on_axes, pull_axes
-from coop_drake.laws.random_draws import uniform_pair
-from coop_drake.laws.readiness import clearance_margin
-from coop_drake.laws.robot_dynamics import estimate_object, read_robot, robot_effort
-from coop_drake.systems.governor_kernels import cell_margin, govern
-from coop_drake.systems.nominal_kernels import accelerate_along, nominal_ready, show_nominal
-from coop_drake.systems.ready_kernels import axes_ready, robot_arrived
+from coop_drake.laws.measurements import NOTHING, carry_measurements, shift_back, uniform_pair, write_errors
+from coop_drake.laws.nominal import carry_axes, place_on_axes, pull_axes
+from coop_drake.laws.readiness import (
+    alarm_at,
+    arrival_margin,
+    axis_level,
+    clearance_margin,
+    largest_departure,
+    quiet_margin,
+)
+from coop_drake.laws.robot_dynamics import end_effector_command, estimate_object, read_robot, robot_effort
+from coop_drake.systems.kernels import (
+    accelerate_along,
+    axes_ready,
+    cell_margin,
+    govern,
+    nominal_ready,
+    robot_arrived,
+    show_nominal,
+)
 from coop_drake.tree.pose import FloatArray, IntArray
 
 LOST_POSE, POSE_NOISE = 1, 5

@@ -61,19 +61,17 @@ from coop_drake.diagram.deployment import (
     seed_of,
 )
 from coop_drake.diagram.knowledge import report_periods
-from coop_drake.diagram.station import blocked_times, downhill, wheel_slips
 from coop_drake.errors import ScenarioError
-from coop_drake.laws.arrival import mean_samples
 from coop_drake.laws.axis_table import first_jumps
-from coop_drake.laws.chain_motion import INERTIA, MASS
-from coop_drake.laws.channels import NOTHING, channel_rows
-from coop_drake.laws.departure import departing_name
+from coop_drake.laws.measurements import NOTHING, channel_rows, whole_periods
 from coop_drake.laws.nominal import nominal_flow
-from coop_drake.laws.sampling import whole_periods
-from coop_drake.plant.configuration import displacement
+from coop_drake.laws.readiness import departing_name, mean_samples
+from coop_drake.laws.robot_dynamics import INERTIA, MASS
+from coop_drake.plant.team import displacement
 from coop_drake.scenario import Deployment
-from coop_drake.systems.current_cell import READY_SIZE
-from coop_drake.systems.departure_monitor import LONG_AGO
+from coop_drake.systems.block import READY_SIZE
+from coop_drake.systems.departures import world_departures
+from coop_drake.systems.monitors import LONG_AGO
 from coop_drake.tree.pose import FloatArray
 
 _USES = 8
@@ -115,7 +113,7 @@ def departures_of(transport: CompiledTransport, deployment: Deployment) -> LoopD
         ScenarioError: The compiled loop does not know what departs.
     """
     period, names = check_deployment(transport, deployment), transport.robot_names
-    m, messages, floor = deployment.measurements, deployment.messages, deployment.floor
+    m, messages = deployment.measurements, deployment.messages
     robots = [deployment.of_robot(name) for name in names]
     joints = np.diff(transport.team.first[2])
     sizes = [("object_pose", 3), *(("robot_state", 2 * (3 + int(n))) for n in joints)]
@@ -125,10 +123,6 @@ def departures_of(transport: CompiledTransport, deployment: Deployment) -> LoopD
     ]
     hearing = [[own.clock_error for own in robots]]
     hearing.append([whole_periods(own.switch_delay, period) for own in robots])
-    bodies = [*names, transport.scenario.object]
-    pushes = [
-        [bodies.index(p.body), *p.force, p.torque, p.time, p.time + p.duration] for p in deployment.pushes
-    ]
     return LoopDepartures(
         times=np.array([period, transport.scenario.simulator.max_time, deployment.actuators.lag]),
         periods=np.array([
@@ -143,13 +137,9 @@ def departures_of(transport: CompiledTransport, deployment: Deployment) -> LoopD
         odometry=np.array([1.0 + own.odometry_scale for own in robots]),
         shifts=np.array([clock_shift(deployment, k) / period for k in range(len(names))]),
         limits=np.concatenate([effort_limits(deployment, n) for n in joints]),
-        floor=np.array([floor.coulomb_friction, floor.viscous_friction, downhill(floor.slope)]),
-        friction=np.array([deployment.joint_friction.coulomb, deployment.joint_friction.viscous]),
-        pushes=np.array(pushes, dtype=float).reshape(-1, 6),
         hearing=np.array(hearing, dtype=float),
         silences=_silences(deployment, names),
-        blocked=blocked_times(deployment, names),
-        slips=wheel_slips(deployment, names),
+        **world_departures(deployment, names)._asdict(),
     )  # fmt: skip
 
 

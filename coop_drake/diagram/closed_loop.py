@@ -6,19 +6,19 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from pydrake.systems.framework import Context, Diagram, DiagramBuilder
+from pydrake.systems.framework import Context, Diagram, DiagramBuilder, System
+from pydrake.systems.primitives import ConstantVectorSource, TrajectorySource
+from pydrake.trajectories import PiecewisePolynomial
 
 from coop_drake.answers.plan import Plan
 from coop_drake.diagram.deployment import DeployedController, deploy
-from coop_drake.diagram.hold import add_supervisor
 from coop_drake.diagram.knowledge import hold_of, robot_knowledge
-from coop_drake.diagram.robot_controller import TELEMETRY, Replacements, build_robot_controller
-from coop_drake.diagram.station import Loop, Places, PortRow, build_station
+from coop_drake.diagram.robot_controller import Replacements, build_robot_controller
+from coop_drake.diagram.station import Loop, Outputs, PortRow, build_station
 from coop_drake.harmonic_maps import HarmonicMap
-from coop_drake.plant.configuration import displacement
-from coop_drake.scenario import Scenario
-from coop_drake.systems import CellPlanner, HoldSupervisor
-from coop_drake.systems.departure_monitor import ALARM_SIZE
+from coop_drake.plant.team import displacement
+from coop_drake.scenario import Hold, Scenario
+from coop_drake.systems import CellPlanner, HoldSupervisor, robot_record
 
 
 @dataclass(frozen=True)
@@ -49,37 +49,19 @@ class ClosedLoop(Loop):
             deployed.prepare(context, self.plan.start[:2])
         return context
 
-    def places(self, ports: PortRow) -> Places:
-        """Add all outputs that are logged to a row, and return where they stand."""
-        robots = self.team.robots
-        states = [ports.add(self.station.diagram, f"robot_{robot.index}_state") for robot in robots]
-        efforts = [ports.add(controller, "robot_effort") for controller in self.controllers]
-        logged = [name for name in TELEMETRY if name != "object_state"]
-        of = {name: [ports.add(law, name) for law in self.bare_controllers] for name in ("ready", *logged)}
-        clock = [] if self.supervisor is None else ports.add(self.bare_controllers[0], "clock")
-        causes = [] if self.supervisor is None else ports.add(self.supervisor, "causes")
-        monitored = [law for law in self.bare_controllers if law.HasOutputPort("alarm")]
-        alarms = [ports.add(law, "alarm") for law in monitored]
-        # Every robot has bounds for the angle; they are equal, and the first robot's are taken.
-        bounds = [np.split(funnels, 2) for funnels in of["funnels"]]
-        return Places(
-            instant=np.concatenate(
-                [ports.add(self.cell_planner, name) for name in ("current_cell", "arrived")]
-            ),
-            base_poses=np.array([state[:3] for state in states]),
-            governors=np.array(of["governor_position"]),
-            funnel_lower=np.concatenate([bounds[0][0][:1], *(lower[1:] for lower, _ in bounds)]),
-            funnel_upper=np.concatenate([bounds[0][1][:1], *(upper[1:] for _, upper in bounds)]),
-            energy_margins=np.concatenate(of["energy_margin"]),
-            commanded_wrenches=np.array(of["hand_command"])[:, 3:],
-            base_wrenches=np.array([effort[:3] for effort in efforts]),
-            joint_torques=np.concatenate([effort[3:] for effort in efforts]),
-            accelerations=np.array(of["object_acceleration"]),
-            realised=self.realised(ports),
-            ready_margins=np.array([margin for _, margin in of["ready"]]),
-            clock_lag=np.array(clock[:1], dtype=np.intp),
-            causes=np.array(causes, dtype=np.intp),
-            alarms=np.array(alarms, dtype=np.intp).reshape(-1, ALARM_SIZE),
+    def outputs(self, ports: PortRow) -> Outputs:
+        """Add the outputs of robots and supervisor to a row, and return where they stand."""
+        names = robot_record(0, holds=True, monitored=True)
+        supervisor = {name: ports.add(self.cell_planner, name) for name in ("current_cell", "arrived")}
+        if self.supervisor is not None:
+            supervisor["causes"] = ports.add(self.supervisor, "causes")
+        return Outputs(
+            [
+                {name: ports.add(law, name) for name in names if law.HasOutputPort(name)}
+                for law in self.bare_controllers
+            ],
+            supervisor,
+            [ports.add(controller, "robot_effort") for controller in self.controllers],
         )
 
 
@@ -143,3 +125,36 @@ def _connect(
     builder.Connect(planner.GetOutputPort("current_cell"), controller.GetInputPort("current_cell"))
     builder.Connect(controller.GetOutputPort("ready"), planner.GetInputPort(f"robot_{k}_ready"))
     builder.Connect(controller.GetOutputPort("robot_effort"), station.GetInputPort(f"robot_{k}_effort"))
+
+
+def add_supervisor(
+    builder: DiagramBuilder, hold: Hold, planner: CellPlanner, robots: int, period: float | None
+) -> HoldSupervisor:
+    """Add the supervisor with the scheduled order, and keep the team in its cell while it is held.
+
+    Args:
+        builder: Holds the cell planner.
+        hold: When the team is held.
+        planner: The cell planner.
+        robots: Number of robots whose requests are heard.
+        period: Control period [s], None in continuous time.
+    """
+    supervisor = builder.AddNamedSystem(
+        "hold_supervisor", HoldSupervisor(robots, silence=hold.silence, period=period)
+    )
+    order = builder.AddNamedSystem("hold_order", _order(hold))
+    builder.Connect(order.get_output_port(0), supervisor.GetInputPort("order"))
+    builder.Connect(supervisor.GetOutputPort("paused"), planner.GetInputPort("paused"))
+    return supervisor
+
+
+def _order(hold: Hold) -> System:
+    """Return the source of the order: 1 from each of the times on for the duration, else 0."""
+    if not hold.at:
+        return ConstantVectorSource([0.0])
+    begins = np.array(sorted(hold.at))
+    events = np.unique(
+        np.concatenate([[0.0], begins, begins + hold.duration, [begins[-1] + 2.0 * hold.duration]])
+    )
+    told = [float(any(begin <= time < begin + hold.duration for begin in begins)) for time in events]
+    return TrajectorySource(PiecewisePolynomial.ZeroOrderHold(events, np.array([told])))

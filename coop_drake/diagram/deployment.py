@@ -23,9 +23,7 @@ from pydrake.systems.primitives import (
 from pydrake.trajectories import PiecewisePolynomial
 
 from coop_drake.diagram.robot_controller import TELEMETRY
-from coop_drake.laws.channels import NOTHING
-from coop_drake.laws.random_draws import uniform_pair
-from coop_drake.laws.sampling import whole_periods
+from coop_drake.laws.measurements import NOTHING, uniform_pair, whole_periods
 from coop_drake.scenario import Deafness, Deployment, Messages, PoseBias, RobotDepartures, Silence
 from coop_drake.systems import (
     Interruption,

@@ -12,11 +12,9 @@ from coop_drake.diagram.robot_controller import RobotKnowledge
 from coop_drake.errors import PlanError, ScenarioError
 from coop_drake.geometry.polygons import BoundaryDistance
 from coop_drake.harmonic_maps import HarmonicMap, VelocityField
-from coop_drake.laws.arrival import ArrivalGoal
-from coop_drake.laws.departure import unseen_time
-from coop_drake.laws.disturbance import observer_gains
 from coop_drake.laws.governor import FIELD_SPEED, slowdown_radius
-from coop_drake.laws.sampling import whole_periods
+from coop_drake.laws.measurements import observer_gains, whole_periods
+from coop_drake.laws.readiness import ArrivalGoal, unseen_time
 from coop_drake.plant import RobotPlant, TeamPlant, base_chain, build_robot_plant, robot_chain
 from coop_drake.plant.team import RobotModel
 from coop_drake.scenario import Hold, Scenario

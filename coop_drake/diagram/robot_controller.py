@@ -10,7 +10,7 @@ from pydrake.systems.framework import Diagram, DiagramBuilder, LeafSystem, Outpu
 from pydrake.systems.primitives import Demultiplexer, DiscreteTimeIntegrator, Integrator, ZeroOrderHold
 
 from coop_drake.answers.plan import Plan
-from coop_drake.laws.arrival import ArrivalGoal
+from coop_drake.laws.readiness import ArrivalGoal
 from coop_drake.plant import ObjectInertia, RobotPlant
 from coop_drake.scenario import Hold
 from coop_drake.systems import (

@@ -11,15 +11,14 @@ from pydrake.systems.framework import Context, DiagramBuilder
 from coop_drake.answers.plan import Plan
 from coop_drake.diagram.deployment import Body, build_body, effort_limits
 from coop_drake.diagram.knowledge import hold_of
-from coop_drake.diagram.station import Loop, Places, PortRow, build_station
+from coop_drake.diagram.station import Loop, Outputs, PortRow, build_station
 from coop_drake.errors import ScenarioError
-from coop_drake.laws.braking import Brake, braking_damping
+from coop_drake.laws.actuators import Brake, braking_damping
 from coop_drake.plant import TeamPlant
-from coop_drake.plant.configuration import displacement
-from coop_drake.plant.team import base_inertia
+from coop_drake.plant.team import base_inertia, displacement
 from coop_drake.scenario import Scenario
 from coop_drake.systems import Exchange, TeamLink, robot_record, supervisor_record
-from coop_drake.systems.departure_monitor import ALARM_SIZE
+from coop_drake.tree.pose import IntArray
 
 
 @dataclass(frozen=True)
@@ -43,35 +42,16 @@ class World(Loop):
             body.prepare(context)
         return context
 
-    def places(self, ports: PortRow) -> Places:
-        """Add what robots and supervisor of a world report for the log, and what the world has itself."""
-        robots = self.team.robots
-        added, records, at = ports.add(self.link, "records"), [], 0
+    def outputs(self, ports: PortRow) -> Outputs:
+        """Add what robots and supervisor report for the log to a row, and return where it stands."""
+        added, records, at = ports.add(self.link, "records"), list[dict[str, IntArray]](), 0
         for names in self.records:
             ends = at + np.cumsum([*names.values()])
-            records.append(dict(zip(names, np.split(added[at : ends[-1]], ends[:-1] - at), strict=True)))
+            parts = zip(names, np.split(added[at : ends[-1]], ends[:-1] - at), strict=True)
+            records.append({name: part for name, part in parts if part.size})
             at = ends[-1]
-        *own, supervisor = records
-        states = [ports.add(self.station.diagram, f"robot_{robot.index}_state") for robot in robots]
         efforts = [ports.add(body.diagram, "robot_effort") for body in self.bodies]
-        bounds = [np.split(record["funnels"], 2) for record in own]
-        return Places(
-            instant=np.concatenate([supervisor["current_cell"], supervisor["arrived"]]),
-            base_poses=np.array([state[:3] for state in states]),
-            governors=np.array([record["governor_position"] for record in own]),
-            funnel_lower=np.concatenate([bounds[0][0][:1], *(lower[1:] for lower, _ in bounds)]),
-            funnel_upper=np.concatenate([bounds[0][1][:1], *(upper[1:] for _, upper in bounds)]),
-            energy_margins=np.concatenate([record["energy_margin"] for record in own]),
-            commanded_wrenches=np.array([record["hand_command"][3:] for record in own]),
-            base_wrenches=np.array([effort[:3] for effort in efforts]),
-            joint_torques=np.concatenate([effort[3:] for effort in efforts]),
-            accelerations=np.array([record["object_acceleration"] for record in own]),
-            realised=self.realised(ports),
-            ready_margins=np.array([record["ready"][1] for record in own]),
-            clock_lag=own[0]["clock"][:1],
-            causes=supervisor["causes"],
-            alarms=np.array([record["alarm"] for record in own]).reshape(-1, ALARM_SIZE),
-        )
+        return Outputs(records[:-1], records[-1], efforts)
 
 
 def control_period(scenario: Scenario) -> float:

@@ -1,5 +1,15 @@
-from .canvas import house_style, legend_above, new_figure, save_figure
-from .floor import BodyFootprint, draw_polygon, draw_team, draw_workspace, team_footprints, team_legend
+from .canvas import (
+    BodyFootprint,
+    draw_polygon,
+    draw_team,
+    draw_workspace,
+    house_style,
+    legend_above,
+    new_figure,
+    save_figure,
+    team_footprints,
+    team_legend,
+)
 from .solids import (
     TriangleMesh,
     camera_pose,

@@ -1,7 +1,5 @@
 from .axis_table import funnel_acceleration
-from .funnels import Funnel, FunnelBounds, funnel_bounds
-from .gain_schedule import transition_gains
-from .gains import FixedGains, GainSet, ScheduledGains, TransitionGains
+from .gains import FixedGains, GainSet, ScheduledGains, TransitionGains, transition_gains
 from .governor import (
     energy_margin,
     governed_acceleration,
@@ -9,9 +7,9 @@ from .governor import (
     slowdown_radius,
     tracking_energy,
 )
-from .load_sharing import acceleration_at, object_twist, total_wrench, wrench_share
-from .ppc import prescribed_acceleration, prescribed_energy
+from .ppc import Funnel, FunnelBounds, funnel_bounds, prescribed_acceleration, prescribed_energy
 from .readiness import clearance_margin, interval_margin
+from .robot_dynamics import acceleration_at, object_twist, total_wrench, wrench_share
 
 __all__ = [
     "FixedGains",

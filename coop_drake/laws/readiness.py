@@ -1,37 +1,22 @@
-"""When a robot reports that it is ready to leave a cell, or that the goal is reached (after (10)-(12)).
-
-Every margin is a number without unit, positive where the condition holds and at most 1. The margin of several
-conditions is the smallest. A robot judges by the object's state, its own p_G and its own joints, never by
-those of another robot.
-"""
+"""When a robot is ready for the next cell, has arrived, or departs from its nominal motion."""
 
 from __future__ import annotations
 
+from math import atan2, cos, hypot, inf, isfinite, sin, sqrt
+from typing import NamedTuple
+
 from coop_drake.jit import compiled
-from coop_drake.laws.axis_table import (
-    ENERGY_BOUND,
-    GOAL_LOWER,
-    GOAL_UPPER,
-    REST_RATE,
-    REST_REACH,
-    track_row,
-)
+from coop_drake.laws.axis_table import ENERGY_BOUND, GOAL_LOWER, GOAL_UPPER, REST_RATE, REST_REACH, track_row
 from coop_drake.laws.governor import energy_margin
+from coop_drake.laws.measurements import whole_periods
+from coop_drake.laws.robot_dynamics import PX, PY, rotated, write_motion
 from coop_drake.tree.pose import FloatArray
 
-__all__ = [
-    "CLEARANCE_FRACTION",
-    "EROSION",
-    "RATE_TOLERANCE",
-    "SPEED_TOLERANCE",
-    "axis_arrival",
-    "axis_ready",
-    "clearance_margin",
-    "funnel_margin",
-    "interval_margin",
-    "position_arrival",
-    "rest_margin",
-]
+# When a robot reports that it is ready to leave a cell, or that the goal is reached (after (10)-(12)).
+#
+# Every margin is a number without unit, positive where the condition holds and at most 1. The margin of
+# several conditions is the smallest. A robot judges by the object's state, its own p_G and its own joints,
+# never by those of another robot.
 
 EROSION = 0.1
 """Fraction of a goal interval's width, at each end, in which an axis does not count as arrived [-]. Erratum
@@ -144,3 +129,284 @@ def axis_arrival(row: FloatArray, position: float, rate: float) -> float:
     """Return the margin with which, in the last cell, one axis is inside its goal and at rest."""
     inside = interval_margin(position, row[GOAL_LOWER], row[GOAL_UPPER])
     return min(inside, rest_margin(rate))
+
+
+# When a sampled robot says that the goal is reached: by the pose and the joints that it measures, averaged.
+#
+# A robot remembers what it measured, raw, in two times of ``MEAN_TIME``, one after the other, W samples
+# each. With their means m_0 and m_1, the newer ones' standard deviation s, and d^2 half the mean square of
+# the differences of one to the next, it has arrived where
+#
+# |m_1 - goal| <= tolerance - max(e, e_s), |m_1 - m_0| <= r + 2 (e + e_s), s^2 <= 2.5 d^2 + (r + e)^2.
+#
+# e is the certified error of what it measures; in the first inequality a tenth of the tolerance counts
+# where that is more (erratum E17b). e_s = c s / root W is the error of the mean by how the samples scatter,
+# and r what counts as rest in ``MEAN_TIME``. In noise that is independent from sample to sample s and d are
+# alike; s is larger where the object moves to and fro. What all samples have in common, as a bias, does not
+# show.
+
+MEAN_TIME = 0.1
+"""Time over which robots average what they measure [s]: long against a control period, so that noise averages
+out, and short beside a transport. What counts as rest moves by at most 1 mm and 2 mrad meanwhile."""
+
+PLANE_DEVIATIONS = 3.44
+"""c for positions in the plane [-]: a normal vector is rarely longer than so many standard deviations of a
+coordinate, as rarely as a normal number is beyond ``DEVIATIONS`` of its own."""
+
+DEVIATIONS = 3.0
+"""c for angles and joints [-]: one number in 370 is beyond."""
+
+SCATTER = 2.5
+"""Largest s^2 over d^2 in noise [-]: of 20 independent numbers the share has a deviation of 0.2 about 1."""
+
+FAR = -1.0
+"""Margin of a robot that has not measured for long enough [-]."""
+
+
+class ArrivalGoal(NamedTuple):
+    """What a robot compares its means with.
+
+    Attributes:
+        place: Where the object shall be, then its angle and the robot's own joints, shape (3 + n,); the value
+            of a free joint is not read [m, rad].
+        tolerances: Largest distance of the object from its place, then the tolerances of the angle and the
+            joints, infinite for free ones, shape (2 + n,) [m, rad].
+        errors: Certified errors of what is measured, in this order, shape (2 + n,) [m, rad].
+    """
+
+    place: FloatArray
+    tolerances: FloatArray
+    errors: FloatArray
+
+
+def mean_samples(period: float) -> int:
+    """Return W, the number of samples of a mean, at least two."""
+    return max(2, whole_periods(MEAN_TIME, period))
+
+
+@compiled(borrows=True)
+def arrival_margin(
+    place: FloatArray, tolerances: FloatArray, errors: FloatArray, recent: FloatArray, newest: int
+) -> float:
+    """Return the margin with which a robot has arrived by what it measures, arrived if not negative [-].
+
+    Args:
+        place: This and the next two arguments are the fields of an ``ArrivalGoal``; see there.
+        tolerances: The tolerances.
+        errors: The certified errors.
+        recent: (x, y, theta, own joints) as measured at the last 2 W samples, infinite where there were
+            fewer, shape (2 W, 3 + n) [m, rad].
+        newest: The row of the newest ones; the older ones stand before it, the last row before the first.
+    """
+    margin = 1.0
+    x, y = _statistics(recent, newest, 0), _statistics(recent, newest, 1)
+    for i in range(tolerances.size):
+        if i == 0:
+            away, before = hypot(x[0] - place[0], y[0] - place[1]), x[1]
+            moved = hypot(x[0] - x[1], y[0] - y[1])
+            scatter, steps = 0.5 * (x[2] + y[2]), 0.5 * (x[3] + y[3])
+            rest, deviations = MEAN_TIME * SPEED_TOLERANCE, PLANE_DEVIATIONS
+        else:
+            mean, before, scatter, steps = _statistics(recent, newest, 2 + i - 1)
+            away, moved = abs(mean - place[1 + i]), abs(mean - before)
+            rest, deviations = MEAN_TIME * RATE_TOLERANCE, DEVIATIONS
+        if not isfinite(before):
+            return FAR
+        noise, still = deviations * sqrt(2.0 * scatter / recent.shape[0]), rest + errors[i]
+        margin = min(margin, 1.0 - moved / (rest + 2.0 * (errors[i] + noise)))
+        margin = min(margin, 1.0 - scatter / (SCATTER * steps + still * still))
+        if tolerances[i] < inf:
+            within = tolerances[i] - max(EROSION * tolerances[i], errors[i], noise)
+            margin = min(margin, 1.0 - away / within if within > 0.0 else FAR)
+    return margin
+
+
+@compiled(borrows=True)
+def _statistics(recent: FloatArray, newest: int, column: int) -> tuple[float, float, float, float]:
+    """Return m_1, m_0, s^2 and d^2 of one column."""
+    rows = recent.shape[0]
+    half, mean, before, scatter, steps = rows // 2, 0.0, 0.0, 0.0, 0.0
+    for i in range(half):
+        mean += recent[(newest - i) % rows, column] / half
+        before += recent[(newest - half - i) % rows, column] / half
+    for i in range(half):
+        value = recent[(newest - i) % rows, column]
+        scatter += (value - mean) ** 2 / (half - 1)
+        if i + 1 < half:
+            steps += 0.5 * (value - recent[(newest - i - 1) % rows, column]) ** 2 / (half - 1)
+    return mean, before, scatter, steps
+
+
+# How far a robot and its object are measured off their nominal motion, and what counts as an alarm.
+#
+# A plan with a budget certifies that nothing departs from its nominal motion by more than D. What a robot
+# measures departs by at most D and the noise of one robot, n_1. The plan therefore states levels a >= D +
+# n_1, above which something is wrong that the budget does not count. While no robot measures more, nothing
+# departs by more than a + n_2, n_2 being the noise that is left where all robots judge: for what they all
+# measure, that of their mean. So it was when the measurements were made. Until a report is used that rests
+# on them, the time
+#
+# t = delay + s + report_age + T
+#
+# passes, s being by how much the age of measurements may be wrong, in which a departure whose rate the
+# noise of rates hides grows by at most n_v t + w t^2 / 2. The plan leaves room for all of it: the strip
+# between the governed sets and their cells is at least a + n_2 + growth wide, and the level of an axis is
+# never more than what its nominal distance d^ to its funnel's bounds leaves, min(a, d^ - n_2 - growth).
+# With a wrong age, n_1 and n_2 hold s times the largest rate, too, for rates s times the largest
+# acceleration.
+#
+# The measurements are raw ones, before predictor, observer and averages, and are compared with the nominal
+# state of the instant at which they were made. The pose of a robot's base is compared with that which the
+# object's pose and the robot's joints give, which shows a grasp that slips and a base that is not where its
+# odometry has it.
+
+QUIET_TIME = 0.1
+"""A monitor is quiet again when nothing was above its level for so long [s]."""
+
+BRAKING = 2.0
+"""So many times its level a departure makes the drives brake [-]: a hold has not stopped it."""
+
+QUIET, ASKS, BRAKES = 0.0, 1.0, 2.0
+"""What a monitor says: nothing, that the team be held, or that the drives brake."""
+
+POSITION, VELOCITY, GRASP, TURN, AHEAD = range(5)
+"""Levels that all transitions of a plan have in common."""
+
+NAMES = (
+    "the object's position",
+    "the object's velocity",
+    "its grasp",
+    "the angle of its base",
+    "where the object goes",
+)
+"""What they are levels of."""
+
+
+def unseen_time(delay: float, report_age: float, period: float, age_error: float) -> float:
+    """Return t, how long a departure may grow until a report is used no more that does not know of it [s].
+
+    Args:
+        delay: Age of the measurements [s].
+        report_age: How long a report may be used [s].
+        period: T [s].
+        age_error: By how much older the measurements may be [s].
+    """
+    return (whole_periods(delay, period) + whole_periods(report_age, period) + 1) * period + age_error
+
+
+def growth(rate_noise: float, error: float, time: float) -> float:
+    """Return by how much a departure grows in a time whose rate the noise hides [m or rad].
+
+    Args:
+        rate_noise: n_v [m/s or rad/s].
+        error: w, largest acceleration that the budget allows besides the model's error [m/s^2 or rad/s^2].
+        time: t [s].
+    """
+    return time * (rate_noise + 0.5 * error * time)
+
+
+def departing_name(check: int, joints: tuple[str, ...]) -> str:
+    """Return what departs the most, by the number of its level, in words.
+
+    Args:
+        check: Its number, see ``largest_departure``.
+        joints: Names of the robot's joints.
+    """
+    if check < len(NAMES):
+        return NAMES[check]
+    axes = ("the object's angle", *joints)
+    number = check - len(NAMES)
+    return axes[number] if number < len(axes) else f"the rate of {axes[number - len(axes)]}"
+
+
+@compiled
+def axis_level(alarm: float, reserve: float, position: float, lower: float, upper: float) -> float:
+    """Return the level of an axis at an instant: what its plan states, or what its room leaves [rad or m].
+
+    Args:
+        alarm: a [rad or m].
+        reserve: n_2 and the growth [rad or m].
+        position: x^, the nominal position [rad or m].
+        lower: Lower bound of its funnel [rad or m].
+        upper: Upper bound [rad or m].
+    """
+    return min(alarm, min(position - lower, upper - position) - reserve)
+
+
+@compiled(borrows=True)
+def largest_departure(
+    chain: FloatArray, p_LE: FloatArray, mounting: FloatArray, motion: FloatArray, robot: FloatArray,
+    seen: FloatArray, led: FloatArray, axes: FloatArray, levels: FloatArray, axis_levels: FloatArray,
+    unseen: float,
+) -> tuple[float, int]:  # fmt: skip
+    """Return the largest measured departure over its level [-], and the number of this level.
+
+    The first five levels are those above, then come those of all axes (theta, q_k), then those of their
+    rates. An axis whose level is not positive departs infinitely.
+
+    Args:
+        chain: From the robot's base to its end effector.
+        p_LE: The grasp in L, shape (2,) or longer [m].
+        mounting: See ``place_on_axes``, shape (1 + n,).
+        motion: Room for the chain's motion, see ``motion_room``.
+        robot: (z_k, z_k') as measured, shape (2 (3 + n),).
+        seen: What ``estimate_object`` makes of it and of the measured pose, shape (6,).
+        led: p^ and p^' when this was measured, shape (4,) or longer.
+        axes: x^ and x^' then, shape (2, 1 + n) or more rows; shape (2, 0) where they have no nominal motion.
+        levels: Of position, velocity, grasp, angle of the base, infinite where there is none, and of where
+            the position goes, shape (5,).
+        axis_levels: Of the axes then, and of their rates, of the shape of ``axes``.
+        unseen: t, how far ahead that is [s].
+    """
+    largest, which, n = 0.0, POSITION, mounting.size - 1
+    last = chain.shape[0] - 1
+    write_motion(chain, robot, motion)
+    rx, ry = rotated(cos(seen[2]), sin(seen[2]), p_LE[0], p_LE[1])
+    turn = robot[2] - seen[2] - mounting[0]
+    for i in range(n):
+        turn -= mounting[1 + i] * robot[3 + i]
+    e_x, e_y, v_x, v_y = seen[0] - led[0], seen[1] - led[1], seen[3] - led[2], seen[4] - led[3]
+    for number in range(5):
+        if number == POSITION:
+            away = hypot(e_x, e_y)
+        elif number == VELOCITY:
+            away = hypot(v_x, v_y)
+        elif number == AHEAD:
+            away = hypot(e_x + unseen * v_x, e_y + unseen * v_y)
+        elif number == GRASP:
+            slipped_x = robot[0] + motion[last, PX] - seen[0] - rx
+            away = hypot(slipped_x, robot[1] + motion[last, PY] - seen[1] - ry)
+        else:
+            away = abs(atan2(sin(turn), cos(turn)))
+        if away > largest * levels[number]:
+            largest, which = away / levels[number], number
+    for row in range(2 if axes.size else 0):
+        for i in range(axes.shape[1]):
+            measured = seen[2 + 3 * row]
+            if i > 0:
+                measured = robot[2 + i] if row == 0 else robot[5 + n + i]
+            away, level = abs(measured - axes[row, i]), axis_levels[row, i]
+            share = away / level if level > 0.0 else inf
+            if share > largest:
+                largest, which = share, 5 + row * axes.shape[1] + i
+    return largest, which
+
+
+@compiled
+def quiet_margin(margin: float, alarm: float) -> float:
+    """Return the margin with which a robot is ready: less than zero where its monitor is not quiet [-]."""
+    return min(margin, -1.0) if alarm > QUIET else margin
+
+
+@compiled
+def alarm_at(share: float, time: float, last: float) -> float:
+    """Return what a monitor says.
+
+    Args:
+        share: Largest departure over its level now [-].
+        time: Now [s].
+        last: When one was above its level the last time before [s].
+    """
+    if share > BRAKING:
+        return BRAKES
+    return ASKS if share > 1.0 or time - last <= QUIET_TIME else QUIET

@@ -18,9 +18,9 @@ from coop_drake.errors import GeometryError, PlanError, StallError, TooQuickErro
 from coop_drake.geometry.swept_tree import BodyPairs, SweptTree
 from coop_drake.jit import compiled
 from coop_drake.laws import GainSet
-from coop_drake.laws.funnels import CLOSING
-from coop_drake.laws.gain_schedule import Schedule, schedule_of, scheduled_axis, scheduled_governor
+from coop_drake.laws.gains import Schedule, schedule_of, scheduled_axis, scheduled_governor
 from coop_drake.laws.governor import FIELD_SPEED, steady_clearance
+from coop_drake.laws.ppc import CLOSING
 from coop_drake.laws.readiness import interval_margin
 from coop_drake.planning.boxes import BoxArrays, box_arrays, clearances_in_box, longest_box
 from coop_drake.planning.cells.cells import FreeBox

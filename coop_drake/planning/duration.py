@@ -36,7 +36,7 @@ from coop_drake.laws.governor import (
     steady_clearance,
     tracking_energy,
 )
-from coop_drake.laws.hand_over import SMOOTHING, SPEED_LIMIT, STIFFNESS, fading, governed_gains
+from coop_drake.laws.ppc import SMOOTHING, SPEED_LIMIT, STIFFNESS, fading, governed_gains, speed_damping
 from coop_drake.laws.readiness import (
     axis_arrival,
     axis_ready,
@@ -44,7 +44,6 @@ from coop_drake.laws.readiness import (
     hand_over_margin,
     position_arrival,
 )
-from coop_drake.laws.speed_limit import speed_damping
 from coop_drake.tree.pose import FloatArray
 
 # The time of a transition by rule of thumb, for choices made before gains are known.

@@ -13,8 +13,8 @@ from coop_drake.answers.limits import Refusal, SpeedStatement, TeamLimits, Unit
 from coop_drake.answers.plan import Plan
 from coop_drake.answers.problem import PlanningProblem
 from coop_drake.errors import TooQuickError
+from coop_drake.laws.ppc import FUNNEL_SHARE, funnel_rate
 from coop_drake.laws.readiness import RATE_TOLERANCE
-from coop_drake.laws.speed_limit import FUNNEL_SHARE, funnel_rate
 from coop_drake.planning.duration import estimated
 from coop_drake.tree.component_tree import ComponentTree, point_levers, turn_levers, usual_unit
 from coop_drake.tree.pose import FloatArray

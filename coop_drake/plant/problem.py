@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 from math import inf
 from pathlib import Path
@@ -12,6 +12,8 @@ from xml.etree import ElementTree
 import numpy as np
 from pydrake.multibody.tree import Joint
 from pydrake.systems.framework import DiagramBuilder
+from shapely import LineString, Point, Polygon, get_coordinates
+from shapely.geometry.base import BaseGeometry
 
 from coop_drake.answers.limits import TeamLimits
 from coop_drake.answers.problem import PlanningProblem, object_radius
@@ -19,13 +21,68 @@ from coop_drake.errors import ScenarioError
 from coop_drake.plant.chain import limits_of, planar_pose
 from coop_drake.plant.component_tree import read_component_tree
 from coop_drake.plant.parsing import refusal
-from coop_drake.plant.placement import collisions, core, wall_clearance
 from coop_drake.plant.team import RobotModel, TeamPlant, build_team_plant
 from coop_drake.scenario import Scenario, assemble
 from coop_drake.scenario.deployment import ALL_ROBOTS
 from coop_drake.scenario.model import RobotLimits
-from coop_drake.tree.component_tree import ComponentTree
-from coop_drake.tree.pose import FloatArray
+from coop_drake.tree.component_tree import Body, ComponentTree, ConvexShape
+from coop_drake.tree.pose import FloatArray, PlanarPose
+
+if TYPE_CHECKING:
+    from xml.etree.ElementTree import Element
+
+# Exact clearances of bodies to the walls and to each other at one configuration.
+
+
+def core(shape: ConvexShape, X_WC: PlanarPose) -> BaseGeometry:
+    """The hull of a shape without its radius, in W: a point, a segment or a polygon."""
+    points = X_WC.apply(shape.vertices)
+    if len(points) == 1:
+        return Point(points[0])
+    return LineString(points) if len(points) == 2 else Polygon(points)
+
+
+def wall_clearance(body: Body, X_WC: PlanarPose, workspace: Polygon) -> float:
+    """Signed distance of a body to the walls [m]: negative or zero where it leaves the workspace."""
+    clearances = [float("inf")]
+    for shape in body.shapes:
+        solid = core(shape, X_WC)
+        gap = workspace.boundary.distance(solid)
+        if not workspace.contains(solid):
+            corners = get_coordinates(solid.difference(workspace))
+            gap = -max((Point(corner).distance(workspace) for corner in corners), default=0.0)
+        clearances.append(gap - shape.radius)
+    return min(clearances)
+
+
+def body_clearance(first: Body, X_WC: PlanarPose, second: Body, X_WD: PlanarPose) -> float:
+    """Distance between two bodies [m]; zero or negative where they touch or overlap."""
+    return min(
+        (
+            float(core(a, X_WC).distance(core(b, X_WD))) - a.radius - b.radius
+            for a in first.shapes
+            for b in second.shapes
+        ),
+        default=float("inf"),
+    )
+
+
+def collisions(tree: ComponentTree, z: FloatArray, workspace: Polygon) -> Iterator[tuple[str, str, float]]:
+    """Yield ``(body, what it hits, clearance)`` for every body that leaves the floor or touches another.
+
+    ``z``: (x, y, theta, q...), shape (3 + n,).
+    """
+    poses = tree.poses(z)
+    for X_WC, component in zip(poses, tree.components, strict=True):
+        for body in component.bodies:
+            clearance = wall_clearance(body, X_WC, workspace)
+            if clearance <= 0.0:
+                yield body.name, "the walls", clearance
+    for (i, j), (k, m) in tree.collision_pairs:
+        first, second = tree.components[i].bodies[j], tree.components[k].bodies[m]
+        clearance = body_clearance(first, poses[i], second, poses[k])
+        if clearance <= 0.0:
+            yield first.name, second.name, clearance
 
 
 def read_limits(team: TeamPlant, tree: ComponentTree) -> TeamLimits:
@@ -99,10 +156,6 @@ def _effort(team: TeamPlant, joint: Joint) -> float:
 
 
 # Names joints whose kind and limits differ: continuous ones should have no limits, revolute ones two.
-
-
-if TYPE_CHECKING:
-    from xml.etree.ElementTree import Element
 
 
 def limit_notes(root: Element, among: Collection[str] | None = None) -> list[str]:

@@ -1,9 +1,9 @@
-"""The team as one plant, rooted at the object."""
+"""The team as one plant, rooted at the object, its configurations, and every robot's model of itself."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, Protocol
 
@@ -17,8 +17,10 @@ from pydrake.multibody.tree import (
     Joint,
     JointIndex,
     ModelInstanceIndex,
+    MultibodyForces,
     PlanarJoint,
     RigidBody,
+    SpatialInertia,
     WeldJoint,
 )
 from pydrake.systems.framework import Context, DiagramBuilder
@@ -41,8 +43,10 @@ from coop_drake.plant.parsing import (
     read_once,
     set_actuators,
 )
-from coop_drake.scenario import Assembly, RobotAssembly, Scenario, assemble
+from coop_drake.scenario import Assembly, Deployment, RobotAssembly, Scenario, assemble
 from coop_drake.tree.pose import FloatArray, PlanarPose
+
+# The team as one plant, rooted at the object.
 
 
 class Grasps(Protocol):
@@ -331,3 +335,138 @@ def _object_inertia(
     p_LLcm = inertia.get_com()
     about_com = inertia.Shift(p_LLcm).CalcRotationalInertia().get_moments()[2]
     return ObjectInertia(float(inertia.get_mass()), float(about_com), np.array(p_LLcm[:2]))
+
+
+# Writes configurations z of the team into a plant's context, and reads the bases' poses from it.
+
+
+def set_configuration(
+    team: TeamPlant, context: Context, z: FloatArray, z_rate: FloatArray | None = None
+) -> None:
+    """Put the team into a configuration.
+
+    Args:
+        team: The team.
+        context: The plant's context.
+        z: (x, y, theta, q...), shape (3 + n,) [m, rad].
+        z_rate: Rates of z, shape (3 + n,); at rest if None.
+    """
+    rates = np.zeros(len(z)) if z_rate is None else z_rate
+    team.plant.SetPositionsAndVelocities(context, team.plant_state(z, rates))
+
+
+def base_poses(team: TeamPlant, context: Context) -> FloatArray:
+    """Read the pose (x, y, angle) of every base in W, shape (N, 3) [m, rad], angles in (-pi, pi]."""
+    poses = [planar_pose(robot.base_body.EvalPoseInWorld(context)) for robot in team.robots]
+    return np.array([(pose.x, pose.y, pose.angle) for pose in poses])
+
+
+def displacement(deployment: Deployment, axes: int) -> FloatArray:
+    """Return how far a team with so many (x, y, theta, q...) stands away from the plan's start [m, rad]."""
+    offset = deployment.start_offset
+    return np.array([offset.x, offset.y, offset.theta, *(offset.joints or (0.0,) * (axes - 3))])
+
+
+# The model that a robot has of itself: alone on the floor, with nothing in its hand.
+
+
+@dataclass(frozen=True)
+class RobotPlant:
+    """A robot's own model with the coordinates z_k = (x, y, yaw, q_k...); its base has a planar joint to W.
+
+    Attributes:
+        plant: Finalized, continuous time, without gravity or geometry.
+        base_body: Bk.
+        base_joint: Moves Bk against the world.
+        joints: In the order of q_k.
+        gripper_frame: Ek.
+        context: Its state, see ``set_state``, and its masses.
+        position_index: Where z_k's entries stand in the plant's positions, shape (3 + n_k,), integers.
+        velocity_index: Where their rates stand in the plant's velocities, shape (3 + n_k,), integers.
+    """
+
+    plant: MultibodyPlant
+    base_body: RigidBody
+    base_joint: PlanarJoint
+    joints: tuple[Joint, ...]
+    gripper_frame: Frame
+    context: Context
+    position_index: Any
+    velocity_index: Any
+
+    def set_state(self, z: FloatArray, z_rate: FloatArray) -> None:
+        """Set z_k and its rates, each of shape (3 + n_k,) [m, rad, 1/s]."""
+        state = np.empty(2 * len(z))
+        state[self.position_index] = z
+        state[len(z) + self.velocity_index] = z_rate
+        self.plant.SetPositionsAndVelocities(self.context, state)
+
+    def scale_masses(self, factor: float) -> None:
+        """Multiply mass and inertia of every body by a factor, to model a robot that errs about them."""
+        for body in bodies_of(self.plant, self._models):
+            inertia = body.CalcSpatialInertiaInBodyFrame(self.context)
+            scaled = SpatialInertia(
+                factor * inertia.get_mass(), inertia.get_com(), inertia.get_unit_inertia()
+            )
+            body.SetSpatialInertiaInBodyFrame(self.context, scaled)
+
+    @property
+    def _models(self) -> list[str]:
+        models = range(2, self.plant.num_model_instances())  # after the world and Drake's default
+        return [self.plant.GetModelInstanceName(ModelInstanceIndex(i)) for i in models]
+
+    @cached_property
+    def has_springs(self) -> bool:
+        """Whether the model has force elements other than gravity, which every plant has."""
+        return self.plant.num_force_elements() > 1
+
+    def spring_effort(self) -> FloatArray:
+        """Effort that balances the force elements without the joints' damping, shape (3 + n_k,) [N, N m]."""
+        forces = MultibodyForces(self.plant)
+        self.plant.CalcForceElementsContribution(self.context, forces)
+        rest = np.zeros(len(self.velocity_index))
+        with_them = self.plant.CalcInverseDynamics(self.context, rest, forces)
+        forces.SetZero()
+        without = self.plant.CalcInverseDynamics(self.context, rest, forces)
+        damping = [joint.GetDampingVector(self.context)[0] for joint in self.joints]
+        rates = self.plant.GetVelocities(self.context)[self.velocity_index[3:]]
+        effort: FloatArray = (with_them - without)[self.velocity_index]
+        effort[3:] -= damping * rates
+        return effort
+
+
+def build_robot_plant(scenario: Scenario, k: int) -> RobotPlant:
+    """Build the model that robot k, in the scenario's order, has of itself.
+
+    All models of one robot of a scenario share the plant, not its context.
+
+    Raises:
+        ScenarioError: As for the team's plant.
+    """
+    robot = _read_robot(scenario, k)
+    return replace(robot, context=robot.plant.CreateDefaultContext())
+
+
+@read_once
+def _read_robot(scenario: Scenario, k: int) -> RobotPlant:
+    assembly = assemble(scenario)
+    robot = assembly.robots[k]
+    plant = MultibodyPlant(0.0)
+    add_models(scenario, assembly, assembly.of_robot(k), plant, None)
+    fix_joints(scenario, assembly, plant)
+    base, joints = find_base(scenario, robot, plant)
+    base_joint = plant.AddJoint(PlanarJoint("base_pose", plant.world_frame(), base.body_frame()))
+    set_actuators(plant, joints)
+    finalize(scenario, plant)
+    positions = [base_joint.position_start() + i for i in range(3)] + [j.position_start() for j in joints]
+    velocities = [base_joint.velocity_start() + i for i in range(3)] + [j.velocity_start() for j in joints]
+    return RobotPlant(
+        plant,
+        base,
+        base_joint,
+        joints,
+        GetScopedFrameByName(plant, robot.gripper_frame),
+        plant.CreateDefaultContext(),
+        np.array(positions),
+        np.array(velocities),
+    )

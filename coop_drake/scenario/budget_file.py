@@ -57,7 +57,7 @@ class TeamMasses(NamedTuple):
         rotors: Inertia of the rotors.
         dampings: Damping of the joints.
         disagreement: Largest acceleration of an axis over that by which the robots' commands for the object's
-            origin differ, see ``laws/disagreement.py`` [rad/m or -].
+            origin differ, see ``laws/couplings.py`` [rad/m or -].
         springs: Whether joints have springs.
     """
 

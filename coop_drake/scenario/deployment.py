@@ -2,7 +2,7 @@
 
 This file holds the values alone; :mod:`coop_drake.scenario.checks` refuses values that do not fit
 together. Three files apply them: :mod:`coop_drake.diagram.deployment` puts blocks between every controller
-and the plant, :mod:`coop_drake.diagram.station` adds forces to those of the robots, and
+and the plant, :mod:`coop_drake.systems.departures` has the forces of the world, and
 :mod:`coop_drake.diagram.knowledge` makes the controllers' model of the team, in which ``mass_error`` acts. A
 new departure is a field here, a block there, tests in ``tests/diagram/test_deployment.py``, a mild and a
 harsh case in ``tests/closed_loop/test_deployment.py``, a row of ``docs/how_to/deployment.md``, wrong values
@@ -15,7 +15,7 @@ from dataclasses import dataclass, field, fields, replace
 from math import sqrt
 from typing import Annotated, Any, Literal
 
-from coop_drake.laws.sampling import whole_periods
+from coop_drake.laws.measurements import whole_periods
 from coop_drake.typed_data import Limits, NotNegative, Positive, Real
 
 Delay = Annotated[float, Limits(at_least=0.0, at_most=10.0)]

@@ -21,27 +21,27 @@ from coop_drake.diagram import Loop, Replacements, World, build_closed_loop
 from coop_drake.diagram.knowledge import arrival_goal
 from coop_drake.geometry.polygons import BoundaryDistance
 from coop_drake.harmonic_maps import HarmonicMap
-from coop_drake.laws.arrival import ArrivalGoal
 from coop_drake.laws.axis_table import ENERGY_BOUND, REST_RATE, axis_table, track_row
-from coop_drake.laws.departure import departing_name
-from coop_drake.laws.hand_over import governed_gains
+from coop_drake.laws.ppc import governed_gains
 from coop_drake.laws.readiness import (
     EROSION,
+    ArrivalGoal,
     axis_ready,
     clearance_margin,
+    departing_name,
     funnel_margin,
     interval_margin,
     position_arrival,
     rest_margin,
 )
 from coop_drake.plant import TeamPlant, read_component_tree
-from coop_drake.plant.scenario_digest import scenario_digest
+from coop_drake.plant.facts import scenario_digest
 from coop_drake.progress import Progress
 from coop_drake.scenario import Scenario
 from coop_drake.simulation.clearance import TeamClearance
 from coop_drake.simulation.telemetry import Invariants, Margins, Sample, Telemetry
-from coop_drake.systems.governor_kernels import cell_margin
-from coop_drake.systems.hold_supervisor import ASKED, BRAKED, SILENT, TOLD
+from coop_drake.systems.holds import ASKED, BRAKED, SILENT, TOLD
+from coop_drake.systems.kernels import cell_margin
 from coop_drake.tree.pose import FloatArray
 
 

@@ -5,7 +5,7 @@ Margins are positive where an invariant holds.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from math import inf
 from typing import NamedTuple
@@ -15,46 +15,24 @@ from pydrake.systems.framework import Context
 
 from coop_drake.answers.log import SimulationLog
 from coop_drake.answers.plan import Plan
-from coop_drake.diagram.station import Loop, Places, PortRow
+from coop_drake.diagram.station import Loop, PortRow
 from coop_drake.geometry.polygons import BoundaryDistance, signed_distance
 from coop_drake.jit import compiled
 from coop_drake.laws import total_wrench
 from coop_drake.simulation.clearance import TeamClearance, team_distances
-from coop_drake.tree.pose import FloatArray
+from coop_drake.tree.pose import FloatArray, IntArray
 from coop_drake.tree.team_arrays import TeamArrays
 
 
 @dataclass(frozen=True)
 class Sample:
-    """One instant of a run; names, units and frames as in ``SimulationLog``, without the leading axis.
+    """One instant of a run.
 
-    Attributes:
-        time: Simulated time [s].
-        cell: Index of the current cell.
-        entry: Time at which it was entered [s].
-        z: Configuration, shape (3 + n,).
-        rates: Rates of z, shape (3 + n,).
-        accelerations: Accelerations of z in the plant, shape (3 + n,).
-        base_poses: Shape (N, 3).
-        governor_position: As robot 0 keeps it, shape (2,).
-        governor_spread: Largest difference to the other robots' copies.
-        funnel_lower: Shape (1 + n,).
-        funnel_upper: Shape (1 + n,).
-        energy_margin: Smallest over the robots.
-        object_wrench: Shape (3,).
-        commanded_wrenches: Shape (N, 3).
-        measured_wrenches: Shape (N, 3).
-        grasp_error: Largest over the robots.
-        base_wrenches: Shape (N, 3).
-        joint_torques: Shape (n,).
-        acceleration_error: Largest component over all robots' commands.
-        ready_margins: As every robot reports it, shape (N,).
-        held: Whether the team is held, 1 or 0.
-        clock_lag: Lag of the funnels' clock since the cell was entered.
-        causes: Why the team is held, as the hold supervisor shows it; empty where it cannot be.
-        alarms: What every robot's monitor of departures says, see ``DepartureMonitor``, shape (N, 3); (0, 3)
-            where there is none.
-        arrived: Whether all robots report arrival.
+    Its fields are the columns of ``SimulationLog`` with their names, shapes and units, without the first
+    axis, and what columns are made of: the time of the sample [s], the index of the cell and the time at
+    which it was entered [s], z and its rates, both of shape (3 + n,), the causes of a hold as the supervisor
+    shows them, of shape (0,) where it cannot be held, what every robot's monitor of departures says, of shape
+    (N, 3), or (0, 3) where there is none, and whether all robots report arrival.
     """
 
     time: float
@@ -137,57 +115,84 @@ class Telemetry:
     """
 
     def __init__(self, loop: Loop, root: Context) -> None:
-        self._team, self._root = loop.team, root
-        self._plant_context = self._team.plant.GetMyContextFromRoot(root)
-        rates = self._team.plant.num_positions() + self._team.velocity_index
-        self._z = len(self._team.position_index)
-        self._own = np.concatenate([self._team.position_index, rates])
+        self._team, self._root = team, _ = loop.team, root
+        self._plant_context = team.plant.GetMyContextFromRoot(root)
+        rates = team.plant.num_positions() + team.velocity_index
+        self._z = len(team.position_index)
+        self._own = np.concatenate([team.position_index, rates])
         self._ports = PortRow(root)
-        places = [np.asarray(part, dtype=np.intp) for part in loop.places(self._ports)]
-        self._order = np.concatenate([part.ravel() for part in places])
-        ends = np.cumsum([part.size for part in places]).tolist()
-        parts = zip(places, ends, strict=True)
-        self._parts = [(slice(end - part.size, end), part.shape) for part, end in parts]
-        grasps = np.array([[robot.X_LE.x, robot.X_LE.y] for robot in self._team.robots])
-        self._load = grasps, self._team.object_inertia.p_LLcm
+        self._places = _places(loop, self._ports)
+        grasps = np.array([[robot.X_LE.x, robot.X_LE.y] for robot in team.robots])
+        self._load = grasps, team.object_inertia.p_LLcm
 
     def read(self) -> Sample:
-        """Read the present instant."""
-        team, row = self._team, self._ports.read()[self._order]
-        at = Places(*[row[part].reshape(shape) for part, shape in self._parts])
+        """Read the present instant: each field of the sample from the ports."""
+        team, row = self._team, self._ports.read()
+        at = {name: row[place] for name, place in self._places.items()}
         state = team.plant.GetPositionsAndVelocities(self._plant_context)[self._own]
         z, errors = state[: self._z], team.grasps.errors(self._plant_context)
         spread, difference, margin, error, lag, held = row_figures(
-            *(at.governors, at.accelerations, at.realised, at.energy_margins, errors, at.clock_lag, at.causes)
+            *(at["governors"], at["wanted"], at["accelerations"], at["energy_margins"], errors),
+            *(at["clock_lag"], at["causes"]),
         )
-        cell, entry, arrived = at.instant.tolist()
+        cell, entry, arrived = at["instant"].tolist()
         return Sample(
             time=self._root.get_time(),
             cell=int(cell),
             entry=entry,
             z=z,
             rates=state[self._z :],
-            accelerations=at.realised,
-            base_poses=at.base_poses,
-            governor_position=at.governors[0],
+            accelerations=at["accelerations"],
+            base_poses=at["base_poses"],
+            governor_position=at["governors"][0],
             governor_spread=spread,
-            funnel_lower=at.funnel_lower,
-            funnel_upper=at.funnel_upper,
+            funnel_lower=at["funnel_lower"],
+            funnel_upper=at["funnel_upper"],
             energy_margin=margin,
-            object_wrench=total_wrench(at.commanded_wrenches, *self._load, float(z[2])),
-            commanded_wrenches=at.commanded_wrenches,
+            object_wrench=total_wrench(at["commanded_wrenches"], *self._load, float(z[2])),
+            commanded_wrenches=at["commanded_wrenches"],
             measured_wrenches=team.grasps.wrenches(self._plant_context),
             grasp_error=error,
-            base_wrenches=at.base_wrenches,
-            joint_torques=at.joint_torques,
+            base_wrenches=at["base_wrenches"],
+            joint_torques=at["joint_torques"],
             acceleration_error=difference,
-            ready_margins=at.ready_margins,
+            ready_margins=at["ready_margins"],
             held=held,
             clock_lag=lag,
-            causes=at.causes,
-            alarms=at.alarms,
+            causes=at["causes"],
+            alarms=at["alarms"],
             arrived=bool(arrived),
         )
+
+
+def _places(loop: Loop, ports: PortRow) -> dict[str, IntArray]:
+    """Return where in a row of ports stands what a sample is made of, in the shape that it has there."""
+    team, station, (robots, supervisor, efforts) = loop.team, loop.station.diagram, loop.outputs(ports)
+    states = [ports.add(station, f"robot_{robot.index}_state") for robot in team.robots]
+    nothing = np.empty(0, dtype=np.intp)
+    lower, upper = zip(*(np.split(own["funnels"], 2) for own in robots), strict=True)
+    return {
+        "instant": np.concatenate([supervisor["current_cell"], supervisor["arrived"]]),
+        "base_poses": np.array([state[:3] for state in states]),
+        "governors": np.array([own["governor_position"] for own in robots]),
+        "funnel_lower": _of_all_axes(lower),
+        "funnel_upper": _of_all_axes(upper),
+        "energy_margins": np.concatenate([own["energy_margin"] for own in robots]),
+        "commanded_wrenches": np.array([own["hand_command"][3:] for own in robots]),
+        "base_wrenches": np.array([effort[:3] for effort in efforts]),
+        "joint_torques": np.concatenate([effort[3:] for effort in efforts]),
+        "wanted": np.array([own["object_acceleration"] for own in robots]),
+        "accelerations": ports.add(station, "generalized_acceleration")[team.velocity_index],
+        "ready_margins": np.array([own["ready"][1] for own in robots]),
+        "clock_lag": robots[0].get("clock", nothing)[:1],
+        "causes": supervisor.get("causes", nothing),
+        "alarms": np.concatenate([nothing, *(own.get("alarm", nothing) for own in robots)]).reshape(-1, 3),
+    }
+
+
+def _of_all_axes(own: Sequence[IntArray]) -> IntArray:
+    """Join what robots have of their axes (theta, q_k); the angle's are equal, and the first counts."""
+    return np.concatenate([own[0][:1], *(numbers[1:] for numbers in own)])
 
 
 # Invariants.

@@ -15,8 +15,7 @@ from coop_drake.answers.plan_file import other_age
 from coop_drake.answers.problem import PlanningProblem
 from coop_drake.errors import RefusalError
 from coop_drake.laws import GainSet, ScheduledGains, TransitionGains, transition_gains
-from coop_drake.laws.gain_schedule import schedule_of
-from coop_drake.laws.gains import IDEAL_AGE, RestCondition
+from coop_drake.laws.gains import IDEAL_AGE, RestCondition, schedule_of
 from coop_drake.planning.duration import estimated
 from coop_drake.tree.component_tree import ComponentTree, usual_unit
 from coop_drake.tree.pose import FloatArray

@@ -1,6 +1,5 @@
 from .block_diagram import block_diagram_figure
-from .figures import angle_figure, summary_figure, write_figures
-from .floor_figures import path_figure
+from .figures import angle_figure, path_figure, summary_figure, write_figures
 from .live import LivePage, LiveView
 from .recording import inline_frame, recording_html, write_recording
 from .scene import TransportScene

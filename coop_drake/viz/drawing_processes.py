@@ -1,7 +1,4 @@
-"""Processes that draw a run: its figures and its recording, beside the command.
-
-They import what they need while the command simulates, and prepare what the plan alone shows.
-"""
+"""Processes that draw a run beside the command, and the names of what they draw."""
 
 from __future__ import annotations
 
@@ -28,6 +25,25 @@ if TYPE_CHECKING:
     from coop_drake.answers.problem import PlanningProblem
     from coop_drake.scenario.model import Scenario
     from coop_drake.viz.figures import RunFigures
+
+# Names of the figures that depend on the team.
+
+_FIRST, _LAST = 10, 11
+
+
+def joints_figure_name(robot: int, name: str) -> str:
+    """Name of the figure of a robot's joints: Figure 10 for the first, Figure 11 for every other.
+
+    Args:
+        robot: Number of the robot, from 0.
+        name: Its name.
+    """
+    return f"fig{min(_FIRST + robot, _LAST)}_joints_{name}"
+
+
+# Processes that draw a run: its figures and its recording, beside the command.
+#
+# They import what they need while the command simulates, and prepare what the plan alone shows.
 
 _CONTEXT = get_context("fork") if sys.platform == "linux" else get_context("spawn")
 """A copy has imported already what this process has; libraries of macOS may not be used in one."""

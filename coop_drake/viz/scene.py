@@ -25,6 +25,7 @@ from shapely import MultiLineString, Point, Polygon, box, minimum_rotated_rectan
 from shapely.geometry.base import BaseGeometry
 
 from coop_drake.answers.plan import Plan
+from coop_drake.drawing.canvas import team_footprints
 from coop_drake.drawing.colours import (
     BLUE,
     EDGE,
@@ -41,7 +42,6 @@ from coop_drake.drawing.colours import (
     red_green_blue,
     robot_colour,
 )
-from coop_drake.drawing.floor import team_footprints
 from coop_drake.drawing.solids import (
     TriangleMesh,
     camera_pose,

@@ -2,9 +2,16 @@
 
 from coop_drake.watching.keyframes import Keyframe, keyframes
 from coop_drake.watching.pictures import keyframe_figure, write_pictures
-from coop_drake.watching.recording import SearchRecording, Strategy, record_search
+from coop_drake.watching.recording import (
+    ChannelCell,
+    Leaf,
+    SearchRecording,
+    SearchState,
+    Strategy,
+    record_search,
+    search_states,
+)
 from coop_drake.watching.scene import scene_page, write_scene
-from coop_drake.watching.search_states import ChannelCell, Leaf, SearchState, search_states
 
 __all__ = [
     "ChannelCell",

@@ -22,8 +22,14 @@ from coop_drake.planning.cells.exploration import Verdict
 from coop_drake.planning.cells.graph import Kind, holds, share_facet
 from coop_drake.tree.component_tree import nearest_turn, turns_to
 from coop_drake.tree.pose import FloatArray
-from coop_drake.watching.recording import BOXES, SearchRecording
-from coop_drake.watching.search_states import ChannelCell, Leaf, SearchState, search_states
+from coop_drake.watching.recording import (
+    BOXES,
+    ChannelCell,
+    Leaf,
+    SearchRecording,
+    SearchState,
+    search_states,
+)
 
 THETA: Interval = (-pi / 4, 7 * pi / 4)
 """The turn of theta that is drawn [rad]; coarse slices begin and end there."""

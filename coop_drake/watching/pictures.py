@@ -23,9 +23,8 @@ from PIL import Image
 
 from coop_drake.answers.problem import PlanningProblem, at_goal
 from coop_drake.drawing import colours
-from coop_drake.drawing.canvas import save_figure
+from coop_drake.drawing.canvas import draw_polygon, draw_team, draw_workspace, outline_of, save_figure
 from coop_drake.drawing.colours import PAPER
-from coop_drake.drawing.floor import draw_polygon, draw_team, draw_workspace, outline_of
 from coop_drake.files import write_atomically
 from coop_drake.geometry.polygons import parts_of
 from coop_drake.geometry.swept_tree import Interval, Intervals
@@ -33,8 +32,7 @@ from coop_drake.planning.cells.graph import Kind
 from coop_drake.progress import Progress
 from coop_drake.tree.pose import FloatArray
 from coop_drake.watching.keyframes import THETA, Components, Keyframe, PathPiece, on_turn, union
-from coop_drake.watching.recording import SearchRecording
-from coop_drake.watching.search_states import ChannelCell, Leaf
+from coop_drake.watching.recording import ChannelCell, Leaf, SearchRecording
 
 DASHES = (0.0, (1.4, 0.9))
 """Dashes of what is not proved, in widths of the line."""

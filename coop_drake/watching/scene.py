@@ -26,7 +26,7 @@ from shapely.affinity import affine_transform
 
 from coop_drake.answers.problem import PlanningProblem, at_goal
 from coop_drake.drawing import colours
-from coop_drake.drawing.floor import team_footprints
+from coop_drake.drawing.canvas import team_footprints
 from coop_drake.drawing.solids import (
     TriangleMesh,
     camera_pose,

@@ -25,8 +25,8 @@ from coop_drake.apart.messages import (
     encode,
 )
 from coop_drake.apart.robot import LONGEST_DOUBT
-from coop_drake.laws.braking import BASE_RATE, JOINT_DAMPING, RETURN_RATE, TURN_RATE
-from coop_drake.systems.team_link import robot_record
+from coop_drake.laws.actuators import BASE_RATE, JOINT_DAMPING, RETURN_RATE, TURN_RATE
+from coop_drake.systems.messages import robot_record
 
 __all__ = ["message_page"]
 

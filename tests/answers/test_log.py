@@ -6,19 +6,10 @@ import pytest
 from coop_drake.answers.log import SimulationLog
 from coop_drake.errors import PlanError
 
-DIGESTS = ("plan_digest", "scenario_digest")
 ROWS, ROBOTS, JOINTS = 5, 2, 3
-SHAPES = {
-    "times": (), "cell_index": (), "transition_start": (), "object_pose": (3,), "object_twist": (3,),
-    "base_poses": (ROBOTS, 3), "joints": (JOINTS,), "joint_rates": (JOINTS,), "accelerations": (3 + JOINTS,),
-    "governor_position": (2,), "governor_spread": (), "ready_margins": (ROBOTS,),
-    "funnel_lower": (1 + JOINTS,), "funnel_upper": (1 + JOINTS,), "energy_margin": (), "object_wrench": (3,),
-    "commanded_wrenches": (ROBOTS, 3), "measured_wrenches": (ROBOTS, 3), "base_wrenches": (ROBOTS, 3),
-    "joint_torques": (JOINTS,), "held": (), "clock_lag": (),
-    "workspace_clearance": (), "body_clearance": (), "cell_clearance": (),
-    "funnel_margin": (), "slice_margin": (), "acceleration_error": (), "wrench_error": (),
-    "grasp_error": (),
-}  # fmt: skip
+SIZES = {"N": ROBOTS, "n": JOINTS, "1 + n": 1 + JOINTS, "3 + n": 3 + JOINTS}
+ROW_SHAPES = {f.name: f.metadata["shape"][1:] for f in fields(SimulationLog) if "T" in f.metadata["shape"]}
+SHAPES = {name: tuple(SIZES.get(size, size) for size in shape) for name, shape in ROW_SHAPES.items()}
 
 
 @pytest.fixture
@@ -55,11 +46,6 @@ def test_a_violation_survives_its_file(log, tmp_path):
     again = SimulationLog.load(path)
     assert again.reached is False
     assert again.violation == "workspace clearance -0.01 m at t = 2 s"
-
-
-def test_every_array_has_a_documented_shape(log):
-    names = {field.name for field in fields(SimulationLog)}
-    assert names == set(SHAPES) | {"reached", "violation", "joint_names", "robot_names", *DIGESTS}
 
 
 def test_an_interrupted_write_leaves_the_old_file(log, tmp_path, monkeypatch):

@@ -10,7 +10,7 @@ from coop_drake.apart.messages import SUPERVISOR, Effort, Reason, Refusals, Samp
 from coop_drake.apart.team_files import local_book
 from coop_drake.apart.transport import Network
 from coop_drake.apart.world import Pacing, SampleExchange
-from coop_drake.laws.braking import Brake
+from coop_drake.laws.actuators import Brake
 
 PERIOD = 0.005
 MEASURED = [np.zeros(2 * 3 + 3)]

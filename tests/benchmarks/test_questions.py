@@ -21,7 +21,7 @@ from coop_drake.answers.plan import SearchReport
 from coop_drake.answers.problem import at_goal
 from coop_drake.planning.planner import plan
 from coop_drake.plant import planning_problem
-from coop_drake.plant.placement import collisions
+from coop_drake.plant.problem import collisions
 from coop_drake.scenario import load_scenario
 from coop_drake.tree.component_tree import Body, Component, ComponentTree
 from tests.support.cases import rectangle

@@ -8,7 +8,7 @@ from benchmarks.searches.departures import BoundedDepartures
 from benchmarks.searches.searching import first_lost, margin_of, search_worst
 from coop_drake.campaign.records import RunRecord
 from coop_drake.plant import planning_problem
-from coop_drake.plant.budgets import budget_of
+from coop_drake.plant.facts import budget_of
 from coop_drake.scenario.budget_file import wave_bounds
 from coop_drake.scenario.deployment import Wave, Waves
 from tests.support.scenarios import write_scenario

@@ -5,7 +5,7 @@ import pytest
 from pydrake.systems.framework import DiagramBuilder
 
 from coop_drake.plant import build_team_plant
-from coop_drake.plant.polygon_body import polygon_body_files, write_polygon_body
+from coop_drake.plant.model_writing import polygon_body_files, write_polygon_body
 from coop_drake.scenario import load_scenario
 from coop_drake.simulation import simulate
 from tests.support.edited_scenario import write_edited, write_with_robot

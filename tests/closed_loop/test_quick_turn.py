@@ -10,7 +10,7 @@ from coop_drake.errors import RefusalError
 from coop_drake.laws import ScheduledGains
 from coop_drake.planning.planner import plan as make
 from coop_drake.plant import planning_problem
-from coop_drake.plant.budgets import budget_of
+from coop_drake.plant.facts import budget_of
 from coop_drake.scenario import Deployment, Goal, ObjectPose, Start
 from coop_drake.simulation import build_maps, simulate
 from coop_drake.typed_data import convert_class

@@ -10,7 +10,7 @@ from coop_drake.compiled_loop import prepare, run, run_many, with_gains
 from coop_drake.errors import RefusalError, ScenarioError
 from coop_drake.laws import ScheduledGains
 from coop_drake.planning import reschedule
-from coop_drake.plant.configuration import displacement
+from coop_drake.plant.team import displacement
 from coop_drake.scenario import (
     ActuatorLimits,
     BlockedWheels,

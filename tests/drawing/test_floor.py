@@ -6,7 +6,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from shapely import Polygon
 
-from coop_drake.drawing.floor import draw_workspace
+from coop_drake.drawing.canvas import draw_workspace
 
 PILLAR = [(1, 1), (3, 1), (3, 3), (1, 3)]
 

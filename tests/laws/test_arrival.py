@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from coop_drake.laws.arrival import FAR, ArrivalGoal, arrival_margin, mean_samples
+from coop_drake.laws.readiness import FAR, ArrivalGoal, arrival_margin, mean_samples
 
 PERIOD = 0.005
 ROWS = 2 * mean_samples(PERIOD)

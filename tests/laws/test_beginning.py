@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from coop_drake.laws.actuators import ACCELERATION, RATE, USED, closed_after, slow_motion, slow_samples
 from coop_drake.laws.axis_table import DECAY_RATE, FADING_TIME, LAW_COLUMNS, RAMP_RATE, bounds_of
-from coop_drake.laws.beginning import ACCELERATION, RATE, USED, closed_after, slow_motion, slow_samples
 
 
 @pytest.mark.parametrize("share", [1.0, 0.25])

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from pydrake.systems.framework import DiagramBuilder
 
 from coop_drake.diagram import brakes_of
-from coop_drake.laws.braking import RETURN_RATE, Brake, braking_damping, braking_effort
+from coop_drake.laws.actuators import RETURN_RATE, Brake, braking_damping, braking_effort
 from coop_drake.plant import build_team_plant
 from coop_drake.plant.team import base_inertia
 from coop_drake.scenario import ActuatorLimits

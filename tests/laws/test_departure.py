@@ -4,7 +4,7 @@ from math import inf
 
 import pytest
 
-from coop_drake.laws.departure import (
+from coop_drake.laws.readiness import (
     ASKS,
     BRAKES,
     QUIET,

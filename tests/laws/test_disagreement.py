@@ -7,12 +7,12 @@ import pytest
 from pydrake.multibody.tree import JacobianWrtVariable
 from pydrake.systems.framework import DiagramBuilder
 
-from coop_drake.laws.disagreement import disagreement_coupling
+from coop_drake.laws.couplings import disagreement_coupling
 from coop_drake.plant import build_team_plant
 from coop_drake.plant.component_tree import read_component_tree
-from coop_drake.plant.configuration import set_configuration
+from coop_drake.plant.facts import bodies_of_team, joint_inertias, largest_disagreement, moved_bodies
 from coop_drake.plant.parsing import bodies_of
-from coop_drake.plant.run_masses import bodies_of_team, joint_inertias, largest_disagreement, moved_bodies
+from coop_drake.plant.team import set_configuration
 from coop_drake.scenario import load_scenario
 from tests.support.ring_team import PRISMATIC, REVOLUTE, ring_team
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from coop_drake.laws.disturbance import FASTEST, LEAK, PHASE, observe, observer_gains
+from coop_drake.laws.measurements import FASTEST, LEAK, PHASE, observe, observer_gains
 
 GAIN, LEAK_RATE = 8.0, 1.6
 

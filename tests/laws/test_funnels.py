@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from coop_drake.laws import Funnel, funnel_bounds
-from coop_drake.laws.gain_schedule import PEAK
+from coop_drake.laws.gains import PEAK
 
 
 def make_funnel(shape):

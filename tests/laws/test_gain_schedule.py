@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from coop_drake.laws import FixedGains, Funnel, ScheduledGains, funnel_acceleration, transition_gains
-from coop_drake.laws.gain_schedule import schedule_of, scheduled_governor
+from coop_drake.laws.gains import schedule_of, scheduled_governor
 
 SLICE = {"slice_lower": np.array([0.0, -1.0]), "slice_upper": np.array([1.0, 1.0])}
 GOAL = {"goal_lower": np.array([0.8, -1.0]), "goal_upper": np.array([1.0, 1.0])}

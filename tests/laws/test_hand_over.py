@@ -18,10 +18,9 @@ from coop_drake.laws.axis_table import (
     track_row,
     write_jumps,
 )
-from coop_drake.laws.gain_schedule import schedule_of
-from coop_drake.laws.gains import RestCondition
+from coop_drake.laws.gains import RestCondition, schedule_of
 from coop_drake.laws.governor import governed_acceleration, tracking_energy
-from coop_drake.laws.hand_over import STEEPEST, fading, governed_gains, shortest_hand_over
+from coop_drake.laws.ppc import STEEPEST, fading, governed_gains, shortest_hand_over
 
 ON_TIME = np.array([0.0, 1.0, 0.0])
 

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from coop_drake.laws.funnels import axis_bounds
-from coop_drake.laws.hold import HOLD_RATE, SETTLING_TIME, lagging_clock, slowed_bounds
+from coop_drake.laws.ppc import HOLD_RATE, SETTLING_TIME, axis_bounds, lagging_clock, slowed_bounds
 
 
 @pytest.mark.parametrize("held", [0.0, 1.0])

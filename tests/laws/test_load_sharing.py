@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from coop_drake.laws import acceleration_at, object_twist, total_wrench, wrench_share
-from coop_drake.laws.load_sharing import end_effector_command, rotated
+from coop_drake.laws.robot_dynamics import end_effector_command, rotated
 from tests.support.robot_matrices import grasp_matrix, turned
 
 OFFSET = np.array([0.4, -0.1])

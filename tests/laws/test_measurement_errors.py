@@ -1,8 +1,7 @@
 import numpy as np
 import pytest
 
-from coop_drake.laws.measurement_errors import square_wave, write_errors
-from coop_drake.laws.random_draws import write_normals
+from coop_drake.laws.measurements import square_wave, write_errors, write_normals
 
 
 @pytest.mark.parametrize(

@@ -5,9 +5,8 @@ import pytest
 from pydrake.systems.framework import DiagramBuilder
 from scipy.integrate import solve_ivp
 
-from coop_drake.laws.chain_motion import motion_room
-from coop_drake.laws.nominal_axes import carry_axes, place_on_axes, pulled_axis
-from coop_drake.laws.robot_dynamics import read_robot
+from coop_drake.laws.nominal import carry_axes, place_on_axes, pulled_axis
+from coop_drake.laws.robot_dynamics import motion_room, read_robot
 from coop_drake.plant import base_chain, build_team_plant
 from coop_drake.scenario import load_scenario
 

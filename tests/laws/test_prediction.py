@@ -3,10 +3,14 @@
 import numpy as np
 import pytest
 
-from coop_drake.laws.chain_motion import motion_room
-from coop_drake.laws.load_sharing import end_effector_command
-from coop_drake.laws.prediction import predict, wanted_accelerations
-from coop_drake.laws.robot_dynamics import base_acceleration, estimate_object, robot_effort
+from coop_drake.laws.measurements import predict, wanted_accelerations
+from coop_drake.laws.robot_dynamics import (
+    base_acceleration,
+    end_effector_command,
+    estimate_object,
+    motion_room,
+    robot_effort,
+)
 from tests.support.planar_arm import random_arm, random_state
 from tests.support.robot_matrices import robot_acceleration
 

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from coop_drake.laws.random_draws import random_words, uniform_pair, write_normals
+from coop_drake.laws.measurements import random_words, uniform_pair, write_normals
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ from coop_drake.laws import Funnel, ScheduledGains, transition_gains
 from coop_drake.laws.axis_table import axis_table
 from coop_drake.laws.gains import RestCondition
 from coop_drake.laws.readiness import axis_ready, clearance_margin, funnel_margin, interval_margin
-from coop_drake.systems.ready_kernels import ready_conditions
+from coop_drake.systems.kernels import ready_conditions
 from tests.support.readiness import margin_of, square_with_clearance
 
 GOAL = {"goal_lower": np.array([0.8, -0.2]), "goal_upper": np.array([1.0, 0.2])}

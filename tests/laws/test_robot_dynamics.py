@@ -1,9 +1,7 @@
 import numpy as np
 import pytest
 
-from coop_drake.laws.chain_motion import motion_room
-from coop_drake.laws.load_sharing import end_effector_command
-from coop_drake.laws.robot_dynamics import estimate_object, robot_effort
+from coop_drake.laws.robot_dynamics import end_effector_command, estimate_object, motion_room, robot_effort
 from tests.support.planar_arm import random_arm, random_state
 from tests.support.robot_matrices import consistent_projector, grasp_matrix, robot_acceleration
 

@@ -4,8 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from coop_drake.laws import Funnel, TransitionGains
-from coop_drake.laws.axis_table import axis_table, bounds_of, track_row
-from coop_drake.laws.slopes import slope_bounds
+from coop_drake.laws.axis_table import axis_table, bounds_of, slope_bounds, track_row
 
 
 def row(shape="quintic", saturation=0.02):

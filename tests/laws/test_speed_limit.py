@@ -7,9 +7,15 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
 from coop_drake.laws.axis_table import ACCELERATION_LIMIT, LAW_COLUMNS, LIMIT_GAIN, RATE_LIMIT, limited_row
-from coop_drake.laws.funnels import decay_factor
 from coop_drake.laws.governor import AHEAD, driving_margin, energy_margin, steady_clearance
-from coop_drake.laws.speed_limit import FUNNEL_SHARE, damped, funnel_rate, slowed_decay_rate, speed_damping
+from coop_drake.laws.ppc import (
+    FUNNEL_SHARE,
+    damped,
+    decay_factor,
+    funnel_rate,
+    slowed_decay_rate,
+    speed_damping,
+)
 
 limits, gains = st.floats(0.05, 5.0), st.floats(0.5, 60.0)
 parts = st.floats(-30.0, 30.0)

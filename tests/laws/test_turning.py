@@ -6,13 +6,12 @@ from pydrake.systems.framework import DiagramBuilder
 from scipy.linalg import expm
 
 from coop_drake.laws import Funnel, ScheduledGains, transition_gains
-from coop_drake.laws.axis_table import axis_table, bounds_of, track_row
-from coop_drake.laws.rate_terms import rate_terms
-from coop_drake.laws.slopes import slope_bounds
+from coop_drake.laws.axis_table import axis_table, bounds_of, slope_bounds, track_row
+from coop_drake.laws.couplings import rate_terms
 from coop_drake.plant import build_team_plant, turning_coupling
 from coop_drake.plant.component_tree import read_component_tree
-from coop_drake.plant.configuration import set_configuration
-from coop_drake.plant.run_masses import bodies_of_team, joint_inertias
+from coop_drake.plant.facts import bodies_of_team, joint_inertias
+from coop_drake.plant.team import set_configuration
 from coop_drake.scenario import load_scenario
 from tests.support.ring_team import PRISMATIC, REVOLUTE, ring_team
 

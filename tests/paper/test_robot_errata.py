@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from coop_drake.laws.chain_motion import motion_room
-from coop_drake.laws.robot_dynamics import robot_effort
+from coop_drake.laws.robot_dynamics import motion_room, robot_effort
 from paper import printed
 from tests.support.planar_arm import random_arm, random_state
 from tests.support.robot_matrices import consistent_projector, robot_acceleration

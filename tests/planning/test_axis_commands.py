@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from coop_drake.answers.budget import Budget
-from coop_drake.laws.nominal_axes import lag_factors
+from coop_drake.laws.nominal import lag_factors
 from coop_drake.planning.budget.axis_departure import best_loop
 from coop_drake.planning.budget.axis_sets import AxisSets
 from coop_drake.planning.budget.axis_tube import ACCELERATION, COLUMNS, COMMAND, COMMAND_REACH

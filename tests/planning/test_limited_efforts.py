@@ -12,7 +12,7 @@ from coop_drake.cli.task import read_task
 from coop_drake.compiled_loop import prepare, run
 from coop_drake.errors import RefusalError, ScenarioError
 from coop_drake.planning.planner import plan
-from coop_drake.plant.budgets import budget_of
+from coop_drake.plant.facts import budget_of
 from coop_drake.simulation import build_maps, simulate
 from coop_drake.verification.budgets import check_budget, check_efforts
 from tests.support.scenarios import write_scenario

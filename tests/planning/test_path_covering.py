@@ -10,7 +10,7 @@ from shapely import Point
 
 from coop_drake.answers.plan_file import check_plan
 from coop_drake.laws import FixedGains, ScheduledGains, transition_gains
-from coop_drake.laws.gain_schedule import schedule_of
+from coop_drake.laws.gains import schedule_of
 from coop_drake.planning import cell_selection, make_plan, plan_time
 from coop_drake.planning.cell_selection import Waypoints, cover_path, quickest_plan
 from coop_drake.planning.cells.cells import CellMaker

@@ -10,7 +10,7 @@ from shapely import Point
 from coop_drake.errors import ScenarioError
 from coop_drake.plant import base_poses, read_component_tree, set_configuration
 from coop_drake.plant.chain import planar_pose
-from coop_drake.plant.placement import core
+from coop_drake.plant.problem import core
 from coop_drake.scenario import load_scenario
 from tests.support.cases import CASES, case
 from tests.support.edited_scenario import shipped, team_of, write_edited, write_with_robot

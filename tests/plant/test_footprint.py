@@ -11,7 +11,7 @@ from pydrake.math import RigidTransform, RollPitchYaw
 from shapely import MultiPoint, points
 
 from coop_drake.plant.component_tree import hull, project
-from coop_drake.plant.placement import core
+from coop_drake.plant.problem import core
 from coop_drake.tree.pose import PlanarPose
 
 TETRAHEDRON = "v 0 0 0\nv 1 0 0\nv 0 0.7 0\nv 0 0 0.5\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n"

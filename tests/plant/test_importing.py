@@ -16,8 +16,7 @@ from typer.testing import CliRunner
 from coop_drake.cli import app
 from coop_drake.cli.task import read_task
 from coop_drake.errors import ScenarioError
-from coop_drake.plant.importing import import_robot
-from coop_drake.plant.joint_survey import survey_joints
+from coop_drake.plant.importing import import_robot, survey_joints
 from tests.support.edited_scenario import exchanged, write_edited
 from tests.support.turret import URDF
 

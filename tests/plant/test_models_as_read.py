@@ -4,7 +4,7 @@ import pytest
 
 from coop_drake.answers.digest import problem_digest
 from coop_drake.cli.task import read_task
-from coop_drake.plant.scenario_digest import models_digest, scenario_digest
+from coop_drake.plant.facts import models_digest, scenario_digest
 from coop_drake.scenario import load_scenario
 from tests.support.edited_scenario import MODELS, exchanged, write_edited
 

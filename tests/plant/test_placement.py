@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from shapely import Polygon, box
 
-from coop_drake.plant.placement import body_clearance, wall_clearance
+from coop_drake.plant.problem import body_clearance, wall_clearance
 from coop_drake.tree.component_tree import Body, ConvexShape
 from coop_drake.tree.pose import PlanarPose
 

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 from pydrake.systems.framework import DiagramBuilder
 
-from coop_drake.laws.chain_motion import motion_room
-from coop_drake.laws.robot_dynamics import estimate_object, read_robot, robot_effort
+from coop_drake.laws.robot_dynamics import estimate_object, motion_room, read_robot, robot_effort
 from coop_drake.plant import base_chain, build_team_plant, robot_chain
 from coop_drake.systems import RobotEffort
 from tests.support.ring_team import PRISMATIC, REVOLUTE, ring_team

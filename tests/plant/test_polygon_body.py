@@ -12,13 +12,8 @@ from typer.testing import CliRunner
 from coop_drake.cli import app
 from coop_drake.errors import GeometryError
 from coop_drake.plant import planning_problem
-from coop_drake.plant.placement import core
-from coop_drake.plant.polygon_body import (
-    convex_parts,
-    planar_mass,
-    polygon_body_files,
-    write_polygon_body,
-)
+from coop_drake.plant.model_writing import convex_parts, planar_mass, polygon_body_files, write_polygon_body
+from coop_drake.plant.problem import core
 from coop_drake.scenario import load_scenario
 from coop_drake.tree.pose import PlanarPose
 from tests.support.edited_scenario import team_of, write_edited

@@ -6,9 +6,16 @@ from pydrake.multibody.math import SpatialForce
 from pydrake.multibody.plant import ExternallyAppliedSpatialForce
 from pydrake.systems.framework import DiagramBuilder
 
-from coop_drake.laws.chain_motion import DAMPING
-from coop_drake.laws.sticking import BRAKING_TIME, STICKING_TIME, stick, sticking_room
-from coop_drake.laws.team_dynamics import solve_tree, team_accelerations, team_work
+from coop_drake.laws.robot_dynamics import DAMPING
+from coop_drake.laws.team_dynamics import (
+    BRAKING_TIME,
+    STICKING_TIME,
+    solve_tree,
+    stick,
+    sticking_room,
+    team_accelerations,
+    team_work,
+)
 from coop_drake.plant import build_team_plant, read_component_tree, read_team_tree
 from tests.support.ring_team import PRISMATIC, REVOLUTE, ring_team
 

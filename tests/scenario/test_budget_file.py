@@ -12,7 +12,7 @@ from coop_drake.cli.simulate import read_plan
 from coop_drake.cli.task import read_task
 from coop_drake.errors import ScenarioError
 from coop_drake.plant import planning_problem
-from coop_drake.plant.budgets import budget_of
+from coop_drake.plant.facts import budget_of
 from coop_drake.scenario import Deployment, Measurements
 from coop_drake.tree.component_tree import axis_levers
 from tests.support.cli import invoke

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from coop_drake.laws.chain_motion import (
+from coop_drake.laws.robot_dynamics import (
     COLUMNS,
     COM_X,
     COM_Y,

@@ -19,8 +19,8 @@ from coop_drake.laws import (
     tracking_energy,
 )
 from coop_drake.laws.axis_table import axis_table, first_jumps
-from coop_drake.laws.hand_over import fading, governed_gains
-from coop_drake.systems.ready_kernels import ready_conditions
+from coop_drake.laws.ppc import fading, governed_gains
+from coop_drake.systems.kernels import ready_conditions
 from tests.support.readiness import margin_of as margin_of_robot
 
 

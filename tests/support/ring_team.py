@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from coop_drake.plant.polygon_body import polygon_body_files, write_polygon_body
+from coop_drake.plant.model_writing import polygon_body_files, write_polygon_body
 from coop_drake.scenario import Scenario, load_scenario
 from tests.support.robot_models import Arm
 

@@ -17,13 +17,12 @@ from coop_drake.answers.plan import Plan
 from coop_drake.geometry.polygons import BoundaryDistance
 from coop_drake.laws import funnel_bounds, total_wrench
 from coop_drake.laws.axis_table import axis_table
-from coop_drake.laws.hand_over import governed_gains
+from coop_drake.laws.ppc import governed_gains
 from coop_drake.plant import base_poses, build_team_plant, planning_problem, set_configuration
 from coop_drake.scenario import Scenario
 from coop_drake.simulation import Invariants, TeamClearance
 from coop_drake.simulation.telemetry import Sample
-from coop_drake.systems.governor_kernels import cell_margin
-from coop_drake.systems.ready_kernels import ready_conditions, robot_ready
+from coop_drake.systems.kernels import NOTHING, cell_margin, ready_conditions, robot_ready
 
 CLOSE = 2e-6
 """Numbers that differ by less are the same here; the checker's tolerances are smaller [-, m, rad, N]."""
@@ -156,7 +155,7 @@ class RunOracle:
                 self.problem.position_tolerance,
             )  # fmt: skip
             own = np.concatenate([np.zeros(3), z[3:][robot.q_slice], np.zeros(3), rates[3:][robot.q_slice]])
-            reports.append(robot_ready(*conditions[k], time, state, own, governor))
+            reports.append(robot_ready(*conditions[k], time, state, own, governor, NOTHING))
         return reports
 
     def _bases_differ(self, stated: np.ndarray, z: np.ndarray) -> bool:

@@ -33,27 +33,27 @@ from coop_drake.compiled_loop.running import believed, departures_of, memory_of,
 from coop_drake.compiled_loop.watching import left_by_all
 from coop_drake.diagram.station import (
     Loop,
-    Places,
+    Outputs,
     PortRow,
     TransportStation,
     _drive_robots,
     _measure,
-    tilt_floor,
 )
 from coop_drake.jit import compiled
 from coop_drake.laws.actuators import lag_behind
 from coop_drake.laws.axis_table import write_bounds
-from coop_drake.laws.sampling import period_of
+from coop_drake.laws.measurements import period_of
 from coop_drake.plant import build_team_plant
-from coop_drake.plant.configuration import displacement
+from coop_drake.plant.team import displacement
 from coop_drake.progress import Progress
 from coop_drake.scenario import Deployment, Scenario
 from coop_drake.simulation import run_loop
 from coop_drake.simulation.telemetry import Sample
 from coop_drake.systems import Block
-from coop_drake.systems.departure_monitor import ALARM_SIZE
-from coop_drake.systems.nominal_kernels import nominal_margin
-from coop_drake.tree.pose import FloatArray, IntArray
+from coop_drake.systems.block import ALARM_SIZE
+from coop_drake.systems.departures import tilt_floor
+from coop_drake.systems.kernels import nominal_margin
+from coop_drake.tree.pose import FloatArray
 
 SHOWN = 20
 """Numbers that a robot shows: pose of its base (3), p_G (2), Delta E, its report (2), what its monitor says
@@ -207,38 +207,31 @@ class SampledLoop(Loop):
 
     Attributes:
         controllers: The block.
-        axis_rows: Row among the M axes of (theta, q), shape (1 + n,).
     """
 
     controllers: SampledTeam
-    axis_rows: IntArray
 
-    def places(self, ports: PortRow) -> Places:
+    def outputs(self, ports: PortRow) -> Outputs:
         """Add all outputs that are logged, and return where they stand."""
-        robots = self.team.robots
+        joints = [len(robot.joints) for robot in self.team.robots]
         told, efforts = ports.add(self.controllers, "telemetry"), ports.add(self.controllers, "efforts")
-        ends = 3 + SHOWN * len(robots)
+        ends = 3 + SHOWN * len(joints)
         shown, bounds = told[3:ends].reshape(-1, SHOWN), told[ends:].reshape(2, -1)
-        own = np.split(efforts, np.cumsum([3 + len(robot.joints) for robot in robots])[:-1])
-        realised = ports.add(self.station.diagram, "generalized_acceleration")[self.team.velocity_index]
-        nothing = np.empty(0, dtype=np.intp)
-        return Places(
-            instant=told[:3],
-            base_poses=shown[:, POSE : POSE + 3],
-            governors=shown[:, GOVERNOR : GOVERNOR + 2],
-            funnel_lower=bounds[0, self.axis_rows],
-            funnel_upper=bounds[1, self.axis_rows],
-            energy_margins=shown[:, MARGIN],
-            commanded_wrenches=shown[:, SHOWN - 3 :],
-            base_wrenches=np.array([effort[:3] for effort in own]),
-            joint_torques=np.concatenate([effort[3:] for effort in own]),
-            accelerations=shown[:, WANTED : WANTED + 3],
-            realised=realised,
-            ready_margins=shown[:, READY + 1],
-            clock_lag=nothing,
-            causes=nothing,
-            alarms=shown[:, ALARM : ALARM + ALARM_SIZE],
-        )
+        of_axes = np.split(bounds, np.cumsum([1 + n for n in joints])[:-1], axis=1)
+        robots = [
+            {
+                "governor_position": own[GOVERNOR : GOVERNOR + 2],
+                "energy_margin": own[MARGIN : MARGIN + 1],
+                "funnels": funnels.ravel(),
+                "object_acceleration": own[WANTED : WANTED + 3],
+                "hand_command": own[SHOWN - 6 :],
+                "ready": own[READY : READY + 2],
+                "alarm": own[ALARM : ALARM + ALARM_SIZE],
+            }
+            for own, funnels in zip(shown, of_axes, strict=True)
+        ]
+        supervisor = {"current_cell": told[:2], "arrived": told[2:3]}
+        return Outputs(robots, supervisor, np.split(efforts, np.cumsum([3 + n for n in joints])[:-1]))
 
 
 def build_sampled_loop(transport: CompiledTransport, deployment: Deployment | None = None) -> SampledLoop:
@@ -270,9 +263,8 @@ def build_sampled_loop(transport: CompiledTransport, deployment: Deployment | No
     builder.Connect(block.GetOutputPort("efforts"), parts.get_input_port())
     for k in range(len(robots)):
         builder.Connect(parts.get_output_port(k), diagram.GetInputPort(f"robot_{k}_effort"))
-    rows = transport.plant.axis_rows[0]
     start = transport.plan.start + displacement(deployment, len(transport.plan.start))
-    return SampledLoop(builder.Build(), station, transport.plan, start, block, rows)
+    return SampledLoop(builder.Build(), station, transport.plan, start, block)
 
 
 def simulate_sampled(

@@ -1,13 +1,10 @@
-"""What every LeafSystem must do: named ports, outputs that only read, clear refusal of missing inputs."""
+"""What every LeafSystem must do: named ports, and outputs that only read."""
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping
 from typing import Any
 
-import numpy as np
-import pytest
 from pydrake.systems.framework import Context, PortDataType, System
 
 SIZE_OF_ABSTRACT = "abstract"
@@ -55,18 +52,3 @@ def state_of(context: Context) -> tuple[list[float], list[list[float]]]:
         list(context.get_continuous_state_vector().CopyToVector()),
         [list(discrete.value(group)) for group in range(discrete.num_groups())],
     )
-
-
-def assert_every_input_is_required(
-    system: System, inputs: Mapping[str, Any], needed: Mapping[str, set[str]], time: float = 0.0
-) -> None:
-    """Every output names, when asked without it, each input that it needs; and needs no other."""
-    for output, names in needed.items():
-        for missing in inputs:
-            rest = {name: value for name, value in inputs.items() if name != missing}
-            context = context_with(system, rest, time)
-            if missing in names:
-                with pytest.raises(RuntimeError, match=re.escape(missing)):
-                    system.GetOutputPort(output).Eval(context)
-            else:
-                assert np.all(np.isfinite(system.GetOutputPort(output).Eval(context)))

@@ -11,7 +11,7 @@ from coop_drake.compiled_loop.loop import advance, update
 from coop_drake.compiled_loop.preparing import CompiledTransport
 from coop_drake.compiled_loop.running import believed, departures_of, memory_of, nominal_of
 from coop_drake.compiled_loop.watching import left_by_all
-from coop_drake.plant.configuration import displacement
+from coop_drake.plant.team import displacement
 from coop_drake.scenario import Deployment
 from coop_drake.tree.pose import FloatArray
 

@@ -2,9 +2,9 @@ import numpy as np
 import pytest
 from pydrake.systems.analysis import Simulator
 
-from coop_drake.laws.arrival import FAR, ArrivalGoal, arrival_margin, mean_samples
+from coop_drake.laws.readiness import FAR, ArrivalGoal, arrival_margin, mean_samples
 from coop_drake.systems import ArrivalMonitor
-from tests.support.system_checks import assert_every_input_is_required, context_with, evaluate, port_sizes
+from tests.support.system_checks import context_with, evaluate
 
 PERIOD, CELLS = 0.01, 3
 GOAL = ArrivalGoal(np.array([3.0, 2.0, 0.5, 0.1]), np.array([0.01, 0.02, np.inf]), np.zeros(3))
@@ -18,13 +18,6 @@ INPUTS = {
 @pytest.fixture
 def monitor():
     return ArrivalMonitor(GOAL, CELLS, PERIOD)
-
-
-def test_ports(monitor):
-    inputs, outputs = port_sizes(monitor)
-    assert inputs == {"robot_state": 8, "object_pose": 3, "current_cell": 2}
-    assert outputs == {"arrival": 1}
-    assert_every_input_is_required(monitor, INPUTS, {"arrival": {"current_cell"}})
 
 
 def test_it_has_not_measured_enough_at_first_and_compares_means_in_the_last_cell_alone(monitor):

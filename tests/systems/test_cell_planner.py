@@ -6,10 +6,8 @@ from pydrake.systems.primitives import ConstantVectorSource, ZeroOrderHold
 
 from coop_drake.systems import CellPlanner
 from tests.support.system_checks import (
-    assert_every_input_is_required,
     context_with,
     evaluate,
-    port_sizes,
     state_of,
 )
 
@@ -21,19 +19,8 @@ def advance(planner, context, until):
     return list(planner.GetOutputPort("current_cell").Eval(simulator.get_context()))
 
 
-def test_ports():
-    inputs, outputs = port_sizes(CellPlanner(3, 5))
-    assert inputs == {"robot_0_ready": 2, "robot_1_ready": 2, "robot_2_ready": 2, "paused": 1}
-    assert outputs == {"current_cell": 2, "arrived": 1}
-
-
 def test_a_plan_starts_in_its_first_cell():
     np.testing.assert_array_equal(evaluate(CellPlanner(2, 3), {}, "current_cell"), [0.0, 0.0])
-
-
-def test_inputs_are_required():
-    ready = {"robot_0_ready": [0.0, 1.0], "robot_1_ready": [0.0, 1.0]}
-    assert_every_input_is_required(CellPlanner(2, 1), ready, {"current_cell": set(), "arrived": set(ready)})
 
 
 @pytest.mark.parametrize(

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from coop_drake.systems import DisturbanceObserver
-from tests.support.system_checks import assert_every_input_is_required, evaluate, port_sizes
+from tests.support.system_checks import evaluate, port_sizes
 
 INPUTS = {
     "object_state": [9.0, 9.0, 9.0, 0.1, 0.2, 0.3],
@@ -12,16 +12,6 @@ INPUTS = {
     "observed_rates": [0.0, 0.1, 0.4, 0.2],
 }
 AHEAD = np.array([0.1, 0.1, -0.1, 0.2])
-
-
-def test_ports_and_what_they_need():
-    block = DisturbanceObserver(1, 5.0, 1.0)
-    assert port_sizes(block) == (
-        {name: len(value) for name, value in INPUTS.items()},
-        {"observer_rate": 4, "compensated_command": 4, "compensated_axes": 2, "disturbance": 4},
-    )
-    outputs = {name: set(INPUTS) for name in port_sizes(block)[1]}
-    assert_every_input_is_required(block, INPUTS, outputs)
 
 
 def test_commands_are_those_wanted_less_the_disturbance():

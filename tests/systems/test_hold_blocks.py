@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from pydrake.systems.analysis import Simulator
 
-from coop_drake.laws.hold import HOLD_RATE, SETTLING_TIME
+from coop_drake.laws.ppc import HOLD_RATE, SETTLING_TIME
 from coop_drake.systems import FunnelClock, HoldMonitor, HoldReceiver, HoldSupervisor, axis_laws
 from tests.support.small_plan import small_plan
 from tests.support.system_checks import context_with, evaluate, port_sizes

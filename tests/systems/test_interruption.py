@@ -6,7 +6,7 @@ from pydrake.systems.primitives import TrajectorySource
 from pydrake.trajectories import PiecewisePolynomial
 
 from coop_drake.systems import Interruption
-from tests.support.system_checks import evaluate, port_sizes
+from tests.support.system_checks import evaluate
 
 PERIOD = 0.1
 
@@ -22,11 +22,6 @@ def given(block, times):
         simulator.AdvanceTo(time)
         values.append(block.get_output_port().Eval(block.GetMyContextFromRoot(simulator.get_context())))
     return np.array(values)
-
-
-def test_ports():
-    block = Interruption(2, PERIOD, begin=1.0)
-    assert port_sizes(block) == ({"wanted": 2}, {"given": 2})
 
 
 @pytest.mark.parametrize(("held", "during"), [(True, [1.9, -0.9]), (False, [0.0, 0.0])])

@@ -5,7 +5,6 @@ from pydrake.systems.framework import DiagramBuilder, LeafSystem
 from pydrake.systems.primitives import FirstOrderLowPassFilter, ZeroOrderHold
 
 from coop_drake.systems import LaggingEffort
-from tests.support.system_checks import assert_every_input_is_required, port_sizes
 
 LAG, PERIOD = 0.03, 0.02
 
@@ -40,12 +39,6 @@ def simulated(offset):
         root = simulator.get_context()
         given.append([block.get_output_port().Eval(block.GetMyContextFromRoot(root)) for block in blocks])
     return np.array(given).transpose(1, 0, 2)
-
-
-def test_ports():
-    block = LaggingEffort(2, LAG, PERIOD)
-    assert port_sizes(block) == ({"held": 2}, {"given": 2})
-    assert_every_input_is_required(block, {"held": [0.0, 0.0]}, {"given": {"held"}})
 
 
 @pytest.mark.parametrize("offset", [0.0, 0.007])

@@ -2,7 +2,6 @@ import numpy as np
 import pytest
 
 from coop_drake.systems import LimitedEffort
-from tests.support.system_checks import assert_every_input_is_required, port_sizes
 
 LIMITS = np.array([5.0, 2.0, 0.5])
 
@@ -12,12 +11,6 @@ def given(asked):
     context = block.CreateDefaultContext()
     block.get_input_port().FixValue(context, asked)
     return block.get_output_port().Eval(context)
-
-
-def test_ports():
-    block = LimitedEffort(LIMITS)
-    assert port_sizes(block) == ({"asked": 4}, {"given": 4})
-    assert_every_input_is_required(block, {"asked": np.zeros(4)}, {"given": {"asked"}})
 
 
 def test_a_force_is_limited_by_its_length_and_keeps_its_direction():

@@ -1,18 +1,12 @@
 import numpy as np
 import pytest
 
-from coop_drake.laws.measurement_errors import write_errors
+from coop_drake.laws.measurements import write_errors
 from coop_drake.systems import MeasurementNoise
-from tests.support.system_checks import assert_every_input_is_required, evaluate, port_sizes
+from tests.support.system_checks import evaluate
 
 PERIOD, DEVIATIONS = 0.1, np.array([0.0, 0.5, 2.0])
 WAVES = np.array([[0.3, 4.0, 0.0], [0.0, 1.0, 0.0], [0.1, 3.0, 0.5]])
-
-
-def test_ports():
-    assert port_sizes(MeasurementNoise(DEVIATIONS, WAVES, PERIOD, 1)) == ({"exact": 3}, {"measured": 3})
-    block = MeasurementNoise(DEVIATIONS, WAVES, PERIOD, 1)
-    assert_every_input_is_required(block, {"exact": [0.0] * 3}, {"measured": {"exact"}})
 
 
 @pytest.mark.parametrize(("time", "number"), [(0.0, 0), (0.05, 0), (0.3, 3), (0.7 - 1e-12, 7)])

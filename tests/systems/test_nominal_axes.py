@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from coop_drake.answers.budget import AxisTracking
-from coop_drake.laws.nominal_axes import carry_axes, pulled_axis
+from coop_drake.laws.nominal import carry_axes, pulled_axis
 from coop_drake.systems import AxisMotion, NominalAxes
-from tests.support.system_checks import context_with, evaluate, port_sizes
+from tests.support.system_checks import context_with, evaluate
 
 START = np.array([0.4, -0.2, 0.7])
 """The object's angle and two joints."""
@@ -33,20 +33,6 @@ def stepped(system, context, steps):
     for _ in range(steps):
         context.SetDiscreteState(system.EvalUniquePeriodicDiscreteUpdate(context))
     return context
-
-
-def test_ports():
-    assert port_sizes(block()) == (
-        {"object_state": 6, "robot_state": 10, "axis_acceleration": 3},
-        {
-            "nominal_object": 6,
-            "nominal_robot": 10,
-            "object_ahead": 6,
-            "robot_ahead": 10,
-            "nominal_axes": 6,
-            "pulled_axes": 3,
-        },
-    )
 
 
 def test_the_motion_follows_the_law_alone():

@@ -14,8 +14,8 @@ from coop_drake.laws.nominal import nominal_flow, tracked_acceleration
 from coop_drake.plant import build_team_plant
 from coop_drake.simulation import build_maps
 from coop_drake.systems import NominalGovernor
-from coop_drake.systems.nominal_kernels import nominal_room
-from tests.support.system_checks import context_with, evaluate, port_sizes
+from coop_drake.systems.kernels import nominal_room
+from tests.support.system_checks import context_with, evaluate
 from tests.support.tubes import BUDGET, tubed_problem
 
 
@@ -39,14 +39,6 @@ def stepped(system, context, steps):
         context.SetDiscreteState(system.EvalUniquePeriodicDiscreteUpdate(context))
         states.append(context.get_discrete_state_vector().CopyToVector())
     return np.array(states)
-
-
-def test_ports():
-    inputs, outputs = port_sizes(NominalGovernor(*known()))
-    assert inputs == {"object_state": 6, "current_cell": 2}
-    paced, _ = port_sizes(NominalGovernor(*known(), paced=True))
-    assert paced == {"object_state": 6, "current_cell": 2, "clock": 3}
-    assert outputs == {"governor_command": 4, "governor_position": 2, "energy_margin": 1, "nominal": 6}
 
 
 def test_the_reference_moves_alike_whatever_is_measured():

@@ -106,6 +106,23 @@ def test_a_block_without_state_has_none_and_any_other_says_which(blocks, name):
         assert re.search(r"^ *State: ", type(block).__doc__, re.MULTILINE)
 
 
+def missing_input(output, context):
+    """The input that an output names because it is not connected; None where it needs none."""
+    try:
+        output.Eval(context)
+    except RuntimeError as error:
+        return re.search(r"InputPort\[\d+\] \((\S+)\) .* is not connected", str(error))[1]
+    return None
+
+
+@pytest.mark.parametrize("name", BLOCKS)
+def test_an_output_says_which_of_its_inputs_is_not_connected(blocks, name):
+    block, _ = blocks[name]
+    context, inputs = block.CreateDefaultContext(), set(port_sizes(block)[0])
+    outputs = [block.get_output_port(i) for i in range(block.num_output_ports())]
+    assert {missing_input(output, context) for output in outputs} <= {None, *inputs}
+
+
 def test_only_switches_jumps_holds_what_is_predicted_and_what_models_failures_are_remembered(blocks):
     remembering = {name for name in BLOCKS if any(map(len, state_of(blocks[name][0].CreateDefaultContext())))}
     failures = {"Interruption", "LaggingEffort", "LossyMeasurement", "MessageChannel", "ShiftedMeasurement"}

@@ -3,10 +3,10 @@ import pytest
 
 from coop_drake.geometry.polygons import BoundaryDistance
 from coop_drake.systems import GovernedCell, ReadyMonitor, axis_laws
-from coop_drake.systems.ready_kernels import ready_conditions
+from coop_drake.systems.kernels import ready_conditions
 from tests.support.readiness import margin_of
 from tests.support.small_plan import GOAL_POSE, POSITION_TOLERANCE, small_plan, stiffer_and_stiffer
-from tests.support.system_checks import assert_every_input_is_required, evaluate, port_sizes
+from tests.support.system_checks import evaluate
 
 PLAN = stiffer_and_stiffer(small_plan(("a", "b", "c")))
 AXES = [0, 2, 3]
@@ -41,17 +41,6 @@ def conditions(cells):
         PLAN.goal_pose[:2],
         POSITION_TOLERANCE,
     )
-
-
-def test_ports(monitor):
-    inputs, outputs = port_sizes(monitor)
-    assert inputs == {
-        "object_state": 6,
-        "robot_state": 10,
-        "governor_position": 2,
-        "current_cell": 2,
-    }
-    assert outputs == {"ready": 2}
 
 
 @pytest.mark.parametrize("index", [0, 1])
@@ -97,10 +86,6 @@ def test_in_the_last_cell_it_reports_arrival(monitor, cells):
     )  # fmt: skip
     assert expected > 0.0
     np.testing.assert_array_equal(evaluate(monitor, inputs, "ready", 10.0), [2.0, expected])
-
-
-def test_inputs_are_required(monitor):
-    assert_every_input_is_required(monitor, INPUTS, {"ready": set(INPUTS)})
 
 
 def test_bad_parameters_are_refused(cells):

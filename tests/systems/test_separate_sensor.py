@@ -5,7 +5,7 @@ from pydrake.systems.framework import DiagramBuilder
 from coop_drake.plant import build_separate_team, build_team_plant, set_configuration
 from coop_drake.systems import TeamSensor, build_separate_sensor
 from tests.support.small_scenario import small_scenario
-from tests.support.system_checks import assert_every_input_is_required, evaluate, port_sizes
+from tests.support.system_checks import evaluate, port_sizes
 
 
 @pytest.fixture(scope="module", params=["base", "elbow"])
@@ -35,9 +35,3 @@ def test_the_same_is_measured_in_both_plants(teams):
     )
     for name, value in zip(names, expected, strict=True):
         np.testing.assert_allclose(evaluate(sensor, {"team_state": state}, name), value, atol=1e-12)
-
-
-def test_the_state_is_required(teams):
-    (separate, state), _ = teams
-    sensor = build_separate_sensor(separate)
-    assert_every_input_is_required(sensor, {"team_state": state}, {"robot_0_state": {"team_state"}})

@@ -2,15 +2,9 @@ import numpy as np
 import pytest
 
 from coop_drake.systems import ShiftedMeasurement
-from tests.support.system_checks import assert_every_input_is_required, evaluate, port_sizes
+from tests.support.system_checks import evaluate
 
 PERIOD = 0.1
-
-
-def test_ports():
-    assert port_sizes(ShiftedMeasurement(3, 0.2, PERIOD)) == ({"exact": 3}, {"measured": 3})
-    block = ShiftedMeasurement(3, 0.2, PERIOD)
-    assert_every_input_is_required(block, {"exact": [0.0] * 3}, {"measured": {"exact"}})
 
 
 @pytest.mark.parametrize(("share", "measured"), [(0.25, [2.5, -1.5]), (1.0, [1.0, 0.0]), (-0.5, [4.0, -3.0])])

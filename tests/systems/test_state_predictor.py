@@ -2,11 +2,11 @@ import numpy as np
 import pytest
 from pydrake.systems.analysis import Simulator
 
-from coop_drake.laws.prediction import predict, wanted_accelerations
+from coop_drake.laws.measurements import predict, wanted_accelerations
 from coop_drake.plant import build_robot_plant, robot_chain
 from coop_drake.systems import StatePredictor
 from tests.support.small_scenario import small_scenario
-from tests.support.system_checks import assert_every_input_is_required, context_with, port_sizes
+from tests.support.system_checks import context_with
 
 PERIOD = 0.01
 LOAD = np.array([0.3, 0.1, 0.0, 0.0, 1.0, 0.5, 0.5])
@@ -21,17 +21,6 @@ INPUTS = {
 @pytest.fixture(scope="module")
 def robot():
     return build_robot_plant(small_scenario("base"), 0)
-
-
-def test_ports_and_what_they_need(robot):
-    block = StatePredictor(robot, LOAD, 2, PERIOD)
-    assert port_sizes(block) == (
-        {"robot_state": 8, "object_pose": 3, "governor_command": 4, "axis_acceleration": 2},
-        {"predicted_state": 8, "predicted_pose": 3},
-    )
-    measured = {"robot_state", "object_pose"}
-    needed = {"predicted_state": measured, "predicted_pose": measured}
-    assert_every_input_is_required(block, INPUTS, needed)
 
 
 def test_it_predicts_by_what_was_commanded_in_the_last_periods(robot):

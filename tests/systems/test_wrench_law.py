@@ -4,7 +4,7 @@ import pytest
 from coop_drake.laws import acceleration_at, wrench_share
 from coop_drake.systems import WrenchLaw
 from tests.support.robot_matrices import turned
-from tests.support.system_checks import assert_every_input_is_required, evaluate, port_sizes
+from tests.support.system_checks import evaluate
 
 P_LE, P_LLCM = np.array([0.4, 0.1]), np.array([0.05, -0.02])
 INPUTS = {
@@ -20,16 +20,6 @@ def law():
     return WrenchLaw(P_LE, p_LLcm=P_LLCM, mass=3.0, inertia=0.7, share=0.25, joints=2)
 
 
-def test_ports(law):
-    inputs, outputs = port_sizes(law)
-    assert inputs == {
-        "object_state": 6,
-        "governor_command": 4,
-        "axis_acceleration": 3,
-    }
-    assert outputs == {"object_acceleration": 3, "hand_command": 6}
-
-
 def test_outputs_are_the_laws(law):
     np.testing.assert_array_equal(evaluate(law, INPUTS, "object_acceleration"), DESIRED)
     r, com = turned(0.7, P_LE), turned(0.7, P_LLCM)
@@ -38,18 +28,6 @@ def test_outputs_are_the_laws(law):
     of_com = acceleration_at(*com, *DESIRED, 0.9)
     expected = wrench_share(*(com - r), *of_com, DESIRED[2], 3.0, 0.7, 0.25)
     np.testing.assert_allclose(share, expected, rtol=1e-14)
-
-
-def test_inputs_are_required(law):
-    command = {"governor_command", "axis_acceleration"}
-    assert_every_input_is_required(
-        law,
-        INPUTS,
-        {
-            "object_acceleration": command,
-            "hand_command": set(INPUTS),
-        },
-    )
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from coop_drake.laws import ScheduledGains, energy_margin, tracking_energy
-from coop_drake.laws.gain_schedule import schedule_of, scheduled_governor
+from coop_drake.laws.gains import schedule_of, scheduled_governor
 from coop_drake.laws.readiness import clearance_margin
 from paper.governor_run import box_clearance, run_governor, straight_field
 

@@ -22,7 +22,7 @@ from coop_drake.laws import ScheduledGains
 from coop_drake.planning.planner import plan as make
 from coop_drake.planning.transitions import with_gains
 from coop_drake.plant import planning_problem
-from coop_drake.plant.budgets import budget_of, scenario_budgets
+from coop_drake.plant.facts import budget_of, scenario_budgets
 from coop_drake.scenario import Deployment, load_scenario
 from coop_drake.scenario.model import RobotLimits
 from coop_drake.typed_data import convert_class, field_types

@@ -20,10 +20,11 @@ from coop_drake.viz.figures import (
     angle_figure,
     break_at_switches,
     joints_figure,
+    path_figure,
     position_figure,
+    start_and_goal_figure,
     summary_figure,
 )
-from coop_drake.viz.floor_figures import path_figure, start_and_goal_figure
 from tests.support.cases import case
 from tests.support.figure_names import OF_EVERY_RUN, OF_TWO_ROBOTS
 from tests.support.sliding import with_sliding_joint

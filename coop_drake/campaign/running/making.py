@@ -20,7 +20,7 @@ from coop_drake.campaign.results import CampaignFolder
 from coop_drake.campaign.settings import Tier, load_campaign
 from coop_drake.campaign.variation import Run, Variation
 from coop_drake.errors import CoopDrakeError, ScenarioError
-from coop_drake.plant.scenario_digest import models_digest, scenario_digest
+from coop_drake.plant.facts import models_digest, scenario_digest
 from coop_drake.scenario.model import Scenario
 from coop_drake.typed_data import DataError
 

@@ -1,4 +1,4 @@
-"""The levels of a plan's monitors, and the room that they need: see ``laws/departure.py``."""
+"""The levels of a plan's monitors, and the room that they need: see ``laws/readiness.py``."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from coop_drake.answers.budget import Alarms, AxisTracking, Budget, PositionTube
-from coop_drake.laws.departure import growth, unseen_time
+from coop_drake.laws.readiness import growth, unseen_time
 from coop_drake.tree.pose import FloatArray
 
 

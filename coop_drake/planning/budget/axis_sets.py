@@ -8,15 +8,8 @@ from math import ceil
 import numpy as np
 
 from coop_drake.jit import compiled
-from coop_drake.laws.axis_table import (
-    DECAY_RATE,
-    FADING_TIME,
-    GOAL_LOWER,
-    GOAL_UPPER,
-    RAMP_RATE,
-    track_row,
-)
-from coop_drake.laws.funnels import CLOSING
+from coop_drake.laws.axis_table import DECAY_RATE, FADING_TIME, GOAL_LOWER, GOAL_UPPER, RAMP_RATE, track_row
+from coop_drake.laws.ppc import CLOSING
 from coop_drake.planning.budget.axis_tube import (
     ACCELERATION,
     COLUMNS,

@@ -16,8 +16,8 @@ import numpy as np
 
 from coop_drake.jit import compiled
 from coop_drake.laws.axis_table import FADING_TIME, bounds_of, track_row
-from coop_drake.laws.hand_over import fading
-from coop_drake.laws.nominal_axes import lag_factors
+from coop_drake.laws.nominal import lag_factors
+from coop_drake.laws.ppc import fading
 from coop_drake.planning.budget.law_fit import fit_law, law_memory
 from coop_drake.tree.pose import FloatArray
 

@@ -20,7 +20,7 @@ from typing import NamedTuple
 import numpy as np
 
 from coop_drake.jit import compiled
-from coop_drake.laws.nominal_axes import lag_factors
+from coop_drake.laws.nominal import lag_factors
 from coop_drake.planning.budget.alarms import axis_errors
 from coop_drake.planning.budget.axis_departure import LATE, AxisLoop
 from coop_drake.planning.budget.axis_sets import AxisSets

@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from coop_drake.jit import compiled
-from coop_drake.laws.axis_table import bounds_of
+from coop_drake.laws.axis_table import bounds_of, gains_of, saturated, slopes_between
 from coop_drake.laws.ppc import track_axis, track_distances
-from coop_drake.laws.slopes import gains_of, saturated, slopes_between
 from coop_drake.tree.pose import FloatArray
 
 PIECES = 8

@@ -8,13 +8,7 @@ from math import ceil
 import numpy as np
 
 from coop_drake.jit import compiled
-from coop_drake.laws.axis_table import (
-    GOAL_LOWER,
-    GOAL_UPPER,
-    LEAVING_TIME,
-    REST_RATE,
-    REST_REACH,
-)
+from coop_drake.laws.axis_table import GOAL_LOWER, GOAL_UPPER, LEAVING_TIME, REST_RATE, REST_REACH
 from coop_drake.planning.budget.axis_sets import AxisSets, Entry
 from coop_drake.planning.budget.axis_tube import ACCELERATION, V_REACH, X_REACH, AxisConditions, V, X
 from coop_drake.tree.pose import FloatArray

@@ -1,6 +1,6 @@
 """How far axes depart where a team begins a cell anew from rest, see ``answers/budget.py``.
 
-On the slow way of ``laws/beginning.py`` every axis has at most a rate and an acceleration that are the same
+On the slow way of ``laws/actuators.py`` every axis has at most a rate and an acceleration that are the same
 in all cells. The departures follow as in a transition, see ``departing.py``, from a rest with constant
 errors. An axis that is taken for resting may have a small rate still: what this causes is added, by
 superposition. The position's tube counts errors at all times before the rest, when none entered; what is
@@ -19,10 +19,10 @@ import numpy as np
 
 from coop_drake.answers.budget import Budget, Restart
 from coop_drake.answers.plan import Plan
-from coop_drake.laws.beginning import ACCELERATION, RATE
-from coop_drake.laws.nominal_axes import lag_factors
+from coop_drake.laws.actuators import ACCELERATION, RATE
+from coop_drake.laws.measurements import whole_periods
+from coop_drake.laws.nominal import lag_factors
 from coop_drake.laws.readiness import RATE_TOLERANCE
-from coop_drake.laws.sampling import whole_periods
 from coop_drake.planning.budget.axis_departure import ACCELERATION as PUSHED
 from coop_drake.planning.budget.axis_departure import HORIZON, SLACK, AxisLoop
 from coop_drake.planning.budget.commands import single_noise

@@ -22,10 +22,10 @@ from coop_drake.laws.axis_table import (
     RATE_GAIN,
     SATURATION,
     bounds_of,
+    slope_bounds,
 )
-from coop_drake.laws.nominal_axes import lag_factors
+from coop_drake.laws.nominal import lag_factors
 from coop_drake.laws.ppc import ramped_gain
-from coop_drake.laws.slopes import slope_bounds
 from coop_drake.planning.budget.axis_tube import AxisConditions
 from coop_drake.planning.budget.law_fit import fit_law, law_memory
 from coop_drake.tree.pose import FloatArray

@@ -16,8 +16,8 @@ from coop_drake.laws.axis_table import (
     REST_RATE,
     REST_REACH,
 )
+from coop_drake.laws.measurements import whole_periods
 from coop_drake.laws.readiness import EROSION
-from coop_drake.laws.sampling import whole_periods
 from coop_drake.planning.budget.alarms import least_distance
 from coop_drake.planning.budget.axis_departure import SLACK, AxisLoop
 from coop_drake.planning.budget.axis_sets import AxisSets, Entry, axis_sets

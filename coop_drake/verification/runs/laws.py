@@ -13,7 +13,7 @@ from shapely import Polygon
 from coop_drake.answers.plan import Plan
 from coop_drake.answers.problem import PlanningProblem
 from coop_drake.errors import RefusalError
-from coop_drake.laws.gains import FunnelShape
+from coop_drake.laws.ppc import FunnelShape
 from coop_drake.tree.pose import FloatArray
 from coop_drake.verification.checks import Check
 from coop_drake.verification.runs.rows import Between, Rows

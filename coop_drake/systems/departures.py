@@ -1,0 +1,286 @@
+"""What the world does to a team beside its actuators: wheels that slip or block, friction, slopes and pushes.
+
+Each departure has its numbers for a run (``WorldDepartures``), its law and its block here. A new one is a key
+in ``scenario/deployment.py``, and the rest in this file.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import inf, sin
+from typing import NamedTuple
+
+import numpy as np
+from pydrake.systems.framework import DiagramBuilder, OutputPort
+from pydrake.systems.primitives import Adder, Demultiplexer, MatrixGain, TrajectorySource
+from pydrake.trajectories import PiecewisePolynomial
+
+from coop_drake.errors import ScenarioError
+from coop_drake.laws.team_dynamics import base_friction, stick, sticking_room, team_work
+from coop_drake.plant import TeamPlant, read_component_tree, read_team_tree
+from coop_drake.plant.planar_model import TeamTree
+from coop_drake.scenario import BlockedWheels, Deployment, Floor, JointFriction, WheelSlip
+from coop_drake.systems.block import Law
+from coop_drake.tree.pose import FloatArray, IntArray
+
+_GRAVITY = 9.80665
+"""Standard acceleration of gravity [m/s^2]."""
+
+
+class WorldDepartures(NamedTuple):
+    """The departures of the world in a run, as numbers for N robots.
+
+    Attributes:
+        slips: When the wheels of every robot slip from and until, inf for never [s], and the share that is
+            lost [-], shape (3, N).
+        floor: Coulomb friction [N], viscous friction [N s/m], acceleration of gravity along x [m/s^2], (3,).
+        pushes: Of every push the robot whose base is pushed, N for the object, its force [N] and torque
+            [N m], begin and end [s], shape (., 6).
+        blocked: When the wheels of every robot are blocked from and until, inf for never, shape (2, N) [s].
+        friction: Coulomb [N m or N] and viscous friction [N m s or N s/m] of every joint, shape (2,).
+    """
+
+    slips: FloatArray
+    floor: FloatArray
+    pushes: FloatArray
+    blocked: FloatArray
+    friction: FloatArray
+
+
+def world_departures(deployment: Deployment, robots: Sequence[str]) -> WorldDepartures:
+    """Return the departures of the world for robots of these names; others that are pushed are the object."""
+    own, floor = [deployment.of_robot(name) for name in robots], deployment.floor
+    slips = [(*_times(one.slip), 0.0 if one.slip is None else one.slip.share) for one in own]
+    bodies = {name: k for k, name in enumerate(robots)}
+    pushes = [
+        (bodies.get(push.body, len(own)), *push.force, push.torque, push.time, push.time + push.duration)
+        for push in deployment.pushes
+    ]
+    return WorldDepartures(
+        slips=np.array(slips).T.copy(),
+        floor=np.array([floor.coulomb_friction, floor.viscous_friction, downhill(floor.slope)]),
+        pushes=np.array(pushes, dtype=float).reshape(-1, 6),
+        blocked=np.array([_times(one.blocked) for one in own]).T.copy(),
+        friction=np.array([deployment.joint_friction.coulomb, deployment.joint_friction.viscous]),
+    )
+
+
+def _times(fault: WheelSlip | BlockedWheels | None) -> tuple[float, float]:
+    """Return when a fault begins and ends [s]."""
+    if fault is None:
+        return inf, inf
+    return fault.begin, inf if fault.duration is None else fault.begin + fault.duration
+
+
+def tilt_floor(team: TeamPlant, floor: Floor) -> None:
+    """Let gravity pull all bodies of a plant down the slope of the floor, along x of W."""
+    if floor.slope:
+        team.plant.mutable_gravity_field().set_gravity_vector([downhill(floor.slope), 0.0, 0.0])
+
+
+def downhill(slope: float) -> float:
+    """Return the acceleration of gravity along a floor [m/s^2], which falls by an angle [rad]."""
+    return _GRAVITY * sin(slope)
+
+
+class WheelSlips(Law):
+    """Takes a share off the wrenches of bases while their wheels slip; part of the world, not of a robot.
+
+    ======= ========== ==== ============================================== =====
+    input   ``driven`` 3 N  wrenches that the actuators of all bases give  W
+    output  ``passed`` 3 N  what the floor takes up of them [N, N m]       W
+    ======= ========== ==== ============================================== =====
+
+    No state.
+
+    Args:
+        slips: When the wheels of every base slip from and until [s], and the share that is lost then [-],
+            shape (3, N).
+    """
+
+    def __init__(self, slips: FloatArray) -> None:
+        begin, end, share = slips
+        size = 3 * slips.shape[1]
+
+        def write(time: float, driven: FloatArray, passed: FloatArray) -> None:
+            left = np.where((begin <= time) & (time < end), 1.0 - share, 1.0)
+            passed[:] = np.repeat(left, 3) * driven
+
+        super().__init__({"driven": size}, {"passed": (size, write)}, timed=True)
+
+
+class FloorFriction(Law):
+    """Gives the friction force on every base, see ``base_friction``; part of the world, not of a robot.
+
+    ======= ===================== ========= ===================================================== =====
+    input   ``robot_<k>_state``   2 (3+n_k) z_k and its rate, z_k = (x, y, yaw of Bk, q_k)         W
+    output  ``friction_wrenches`` 3 N       force and zero torque on every base at Bk [N, N m]     W
+    ======= ===================== ========= ===================================================== =====
+
+    No state.
+
+    Args:
+        joints: Number of joints of every robot.
+        coulomb: Coulomb friction of a base [N].
+        viscous: Viscous friction of a base [N s/m].
+
+    Raises:
+        ValueError: A friction is negative.
+    """
+
+    def __init__(self, joints: Sequence[int], coulomb: float, viscous: float) -> None:
+        if not (coulomb >= 0.0 and viscous >= 0.0):
+            raise ValueError(f"FloorFriction needs no negative friction, not {coulomb} and {viscous}")
+
+        def write(*given: FloatArray) -> None:
+            *states, wrenches = given
+            for k, (state, n) in enumerate(zip(states, joints, strict=True)):
+                force = base_friction(state[3 + n], state[4 + n], coulomb, viscous)
+                wrenches[3 * k : 3 * k + 3] = *force, 0.0
+
+        super().__init__(
+            {f"robot_{k}_state": 2 * (3 + n) for k, n in enumerate(joints)},
+            {"friction_wrenches": (3 * len(joints), write)},
+        )
+
+
+class Sticking(Law):
+    """Adds what the floor does to bases with blocked wheels, and the friction of joints.
+
+    See ``laws/team_dynamics.py``. It is part of the world, not of a robot.
+
+    ======= ================= ========== ==================================================== =====
+    input   ``team_state``    2 (3 + n)  the plant's positions and velocities, its own order
+    input   ``joint_torques`` n          torques of all joints in the order of q [N m or N]
+    input   ``asked``         3 N or 3   wrenches on all bases without the floor's, and where  W
+                              more       there are pushes, the one on the object [N, N m]
+    output  ``forces``        as asked,  the same with the floor's; then the friction of every W
+                              and 3 + n  joint at the place of its rate in the plant
+    ======= ================= ========== ==================================================== =====
+
+    No state.
+
+    Args:
+        whole: The team's plant in the plane.
+        rates: Where the rates of the joints stand among those of the plant, in the order of q, shape (n,).
+        world: The departures.
+        size: Number of the wrenches' components.
+    """
+
+    def __init__(self, whole: TeamTree, rates: IntArray, world: WorldDepartures, size: int) -> None:
+        links, robots, rows = len(whole.tree), world.blocked.shape[1], size // 3
+        known = whole.tree, whole.bases[:rows].copy(), whole.places[:rows].copy()
+        self._known, self._rates, self._world, self._strongest = known, rates, world, whole.strongest
+        self._room = team_work(whole.tree), sticking_room(links, robots), np.empty(links + 2)
+        inputs = {"team_state": 2 * (links + 2), "joint_torques": len(rates), "asked": size}
+        super().__init__(inputs, {"forces": (size + links + 2, self._write_forces)}, timed=True)
+
+    def _write_forces(
+        self, time: float, state: FloatArray, torques: FloatArray, asked: FloatArray, forces: FloatArray
+    ) -> None:
+        world, forces[: asked.size], forces[asked.size :] = self._world, asked, 0.0
+        blocked = ((world.blocked[0] <= time) & (time < world.blocked[1])).astype(float)
+        if not (blocked.any() or world.friction.any()):
+            return
+        given = np.zeros(forces.size - asked.size)
+        given[self._rates] = np.clip(torques, -self._strongest, self._strongest)
+        efforts, wrenches = given.copy(), asked.reshape(-1, 3).copy()
+        stick(
+            *self._known,
+            blocked,
+            world.friction,
+            efforts,
+            float(world.floor[2]),
+            state,
+            *self._room,
+            wrenches,
+        )
+        forces[: asked.size], forces[asked.size :] = wrenches.ravel(), efforts - given
+
+
+def add_departures(
+    builder: DiagramBuilder, team: TeamPlant, states: Sequence[OutputPort], wrenches: OutputPort,
+    torques: OutputPort,
+) -> OutputPort:  # fmt: skip
+    """Add the departures of the world that a team's scenario switches on.
+
+    Slipping wheels take their share off what the actuators give; then friction and pushes are added; blocked
+    wheels act on the sum of all, and so does the friction of joints, which the plant gets as generalized
+    forces.
+
+    Args:
+        builder: Receives the blocks.
+        team: The team.
+        states: True state of every robot.
+        wrenches: Wrenches on all bases in W, of size 3 N.
+        torques: Torques of all joints, of size n.
+
+    Returns:
+        Wrenches on all bases, and where there are pushes, the one on the object at L: size 3 N or 3 N + 3.
+
+    Raises:
+        ScenarioError: Wheels are blocked or joints have friction in a team with springs.
+    """
+    world = world_departures(team.scenario.deployment, [robot.name for robot in team.robots])
+    if np.isfinite(world.slips[0]).any():
+        slipping = builder.AddNamedSystem("wheel_slips", WheelSlips(world.slips))
+        builder.Connect(wrenches, slipping.get_input_port())
+        wrenches = slipping.get_output_port()
+    if world.floor[:2].any():
+        joints = [len(robot.joints) for robot in team.robots]
+        friction = builder.AddNamedSystem("floor_friction", FloorFriction(joints, *world.floor[:2].tolist()))
+        for k, state in enumerate(states):
+            builder.Connect(state, friction.get_input_port(k))
+        wrenches = _sum(builder, "wrenches_less_friction", wrenches, friction.get_output_port())
+    if len(world.pushes):
+        size = wrenches.size()
+        on_object = builder.AddNamedSystem("wrenches_with_object", MatrixGain(np.eye(size + 3, size)))
+        builder.Connect(wrenches, on_object.get_input_port())
+        pushes = builder.AddNamedSystem("pushes", TrajectorySource(_pushes(world.pushes, size + 3)))
+        wrenches = _sum(builder, "pushed", on_object.get_output_port(), pushes.get_output_port())
+    if np.isfinite(world.blocked[0]).any() or world.friction.any():
+        wrenches = _stick(builder, team, world, wrenches, torques)
+    return wrenches
+
+
+def _stick(
+    builder: DiagramBuilder, team: TeamPlant, world: WorldDepartures, wrenches: OutputPort,
+    torques: OutputPort,
+) -> OutputPort:  # fmt: skip
+    """Add the wrenches of the floor on bases with blocked wheels, and the friction of joints.
+
+    Raises:
+        ScenarioError: The team has springs.
+    """
+    friction = team.scenario.deployment.joint_friction
+    if team.plant.num_force_elements() > 1:  # every plant has gravity
+        key, value = ("joint_friction", friction) if friction != JointFriction() else ("robots", "blocked")
+        allowed = "none: blocked wheels and friction of joints are simulated for models without springs alone"
+        raise ScenarioError(str(team.scenario.path), f"deployment.{key}", value, allowed)
+    whole, size = read_team_tree(team, read_component_tree(team)), wrenches.size()
+    block = builder.AddNamedSystem("sticking", Sticking(whole, team.velocity_index[3:], world, size))
+    parts = builder.AddNamedSystem("sticking_parts", Demultiplexer([size, team.plant.num_velocities()]))
+    builder.Connect(team.plant.get_state_output_port(), block.GetInputPort("team_state"))
+    builder.Connect(torques, block.GetInputPort("joint_torques"))
+    builder.Connect(wrenches, block.GetInputPort("asked"))
+    builder.Connect(block.get_output_port(), parts.get_input_port())
+    builder.Connect(parts.get_output_port(1), team.plant.get_applied_generalized_force_input_port())
+    return parts.get_output_port(0)
+
+
+def _sum(builder: DiagramBuilder, name: str, first: OutputPort, second: OutputPort) -> OutputPort:
+    adder = builder.AddNamedSystem(name, Adder(2, first.size()))
+    builder.Connect(first, adder.get_input_port(0))
+    builder.Connect(second, adder.get_input_port(1))
+    return adder.get_output_port()
+
+
+def _pushes(pushes: FloatArray, size: int) -> PiecewisePolynomial:
+    """Return the sum of all pushes on each body as a function of time, wrenches of so many numbers."""
+    times = sorted({0.0, *pushes[:, 4:].ravel().tolist()})
+    # The last sample is zero, and its value holds for ever.
+    values = np.zeros((size, len(times)))
+    for body, *wrench, begin, end in pushes.tolist():
+        at, lasting = 3 * int(body), [begin <= time < end for time in times]
+        values[at : at + 3, lasting] += np.array([wrench]).T
+    return PiecewisePolynomial.ZeroOrderHold([*times, times[-1] + 1.0], np.c_[values, values[:, -1]])
