@@ -7,7 +7,7 @@ from .governor import (
     slowdown_radius,
     tracking_energy,
 )
-from .ppc import Funnel, FunnelBounds, funnel_bounds, prescribed_acceleration, prescribed_energy
+from .ppc import Funnel, FunnelBounds, funnel_bounds
 from .readiness import clearance_margin, interval_margin
 from .robot_dynamics import acceleration_at, object_twist, total_wrench, wrench_share
 
@@ -27,8 +27,6 @@ __all__ = [
     "governor_velocity",
     "interval_margin",
     "object_twist",
-    "prescribed_acceleration",
-    "prescribed_energy",
     "slowdown_radius",
     "total_wrench",
     "tracking_energy",

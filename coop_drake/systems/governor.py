@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
+from typing import Any
 
 import numpy as np
 from pydrake.systems.framework import BasicVector, Context, DiscreteValues, EventStatus
@@ -13,15 +14,13 @@ from coop_drake.answers.budget import PositionTube
 from coop_drake.geometry.polygons import BoundaryDistance
 from coop_drake.harmonic_maps import VelocityField
 from coop_drake.laws.gains import TransitionGains
-from coop_drake.laws.governor import driving_margin, governor_velocity, steady_clearance
 from coop_drake.laws.nominal import nominal_flow
-from coop_drake.laws.ppc import SPEED_LIMIT, governed_gains
+from coop_drake.laws.ppc import governed_gains
 from coop_drake.systems.block import CLOCK_SIZE, CURRENT_CELL_SIZE, Block, clock_of, index_of
 from coop_drake.systems.kernels import (
     NOMINAL_SIZE,
     STATE_SIZE,
     accelerate_along,
-    accelerate_object,
     cell_margin,
     govern,
     nominal_margin,
@@ -37,13 +36,13 @@ class GovernedCell:
 
     Attributes:
         clearance: Signed distance to the boundary of the governed set [m].
-        field: Velocity field that leads to the cell's target, (2,) -> (2,) [m/s].
+        field: Velocity field that leads to the cell's target.
         gains: Gains of the transition.
         before: Gains of the transition before; its own if there is none.
     """
 
     clearance: BoundaryDistance
-    field: Callable[[FloatArray], FloatArray]
+    field: VelocityField
     gains: TransitionGains
     before: TransitionGains | None = None
 
@@ -52,31 +51,10 @@ class GovernedCell:
         """The governor's row, see ``governed_gains``, shape (9,)."""
         return self.gains.governor_row(self.before or self.gains)
 
-    def prepared_law(self) -> Callable[[float, FloatArray, FloatArray, FloatArray], object]:
-        """Return ``govern`` below; compiled as a whole where the field is that of a harmonic map."""
-        if not isinstance(self.field, VelocityField):
-            return self.govern
-        known = self.row, self.clearance.edges, *self.field.kernel_arguments
-        return partial(govern, *known)
-
-    def govern(
-        self, time: float, object_state: FloatArray, governor_position: FloatArray, command: FloatArray
-    ) -> None:
-        """Write p_G' and the desired acceleration, both of (14), in this cell, with any velocity field.
-
-        Args:
-            time: Time since the cell was entered [s].
-            object_state: Pose and twist of the object, shape (6,).
-            governor_position: p_G, shape (2,) [m].
-            command: Receives both, shape (4,) [m/s, m/s^2].
-        """
-        gains, edges = governed_gains(self.row, time), self.clearance.edges
-        clearance, limit = self.clearance(governor_position), self.row[SPEED_LIMIT]
-        margin = cell_margin(edges, gains[0], object_state, governor_position)
-        driving = driving_margin(margin, clearance, steady_clearance(limit, *gains), gains[0])
-        vx, vy = (float(part) for part in self.field(governor_position))
-        command[:2] = governor_velocity(vx, vy, driving, gains[0], gains[2], self.gains.smoothing)
-        accelerate_object(gains, limit, object_state, governor_position, command[2:])
+    @property
+    def known(self) -> tuple[Any, ...]:
+        """What compiled laws of the cell take first: the row, edges of the governed set, and the field."""
+        return self.row, self.clearance.edges, *self.field.kernel_arguments
 
 
 class ReferenceGovernor(Block):
@@ -108,7 +86,7 @@ class ReferenceGovernor(Block):
         super().__init__()
         if not cells:
             raise ValueError("ReferenceGovernor needs at least one cell")
-        self._govern = [cell.prepared_law() for cell in cells]
+        self._govern = [partial(govern, *cell.known) for cell in cells]
         self._gains = [partial(governed_gains, cell.row) for cell in cells]
         self._margin = [partial(cell_margin, cell.clearance.edges) for cell in cells]
         self._object = self.DeclareVectorInputPort("object_state", 6)
@@ -201,7 +179,8 @@ class NominalGovernor(Block):
             raise ValueError("NominalGovernor needs the same K in all cells")
         flow = nominal_flow(gains.stiffness, gains.damping, motion.period)
         self._motion = motion
-        self._steps = [_prepared_step(cell, flow, motion) for cell in cells]
+        flowing = flow, motion.period, motion.tube.speed
+        self._steps = [partial(step_nominal, *cell.known, *flowing) for cell in cells]
         tracking = motion.tracking_row(cells[0])
         self._accelerate = partial(accelerate_along, tracking)
         regions = [(cell.clearance.edges, gains.stiffness) for cell in cells]
@@ -256,17 +235,3 @@ class NominalGovernor(Block):
 def _reports_of(motion: NominalMotion) -> tuple[float, float, float]:
     """Return the control period [s], for how many of them a report is used [-], and p_G's speed [m/s]."""
     return motion.period, float(motion.report_periods), motion.tube.speed
-
-
-def _prepared_step(
-    cell: GovernedCell, flow: FloatArray, motion: NominalMotion
-) -> Callable[[float, FloatArray, FloatArray], None]:
-    """Return ``step_nominal`` for one cell.
-
-    Raises:
-        TypeError: The cell's velocity field is not that of a harmonic map.
-    """
-    if not isinstance(cell.field, VelocityField):
-        raise TypeError("NominalGovernor needs the velocity fields of harmonic maps")
-    known = cell.row, cell.clearance.edges, *cell.field.kernel_arguments, flow
-    return partial(step_nominal, *known, motion.period, motion.tube.speed)

@@ -12,6 +12,7 @@ from manifold3d import CrossSection, FillRule
 
 from coop_drake.answers.problem import PlanningProblem, at_goal
 from coop_drake.geometry.polygons import polygon_rings
+from coop_drake.geometry.swept_tree import Intervals
 from coop_drake.planning.cells.as_printed import PaperExploration
 from coop_drake.planning.cells.cells import Region
 from coop_drake.planning.cells.exploration import (

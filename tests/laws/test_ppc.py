@@ -1,13 +1,9 @@
 import numpy as np
 import pytest
 
-from coop_drake.laws import (
-    Funnel,
-    funnel_bounds,
-    prescribed_acceleration,
-    prescribed_energy,
-)
+from coop_drake.laws import Funnel, funnel_bounds
 from coop_drake.laws.ppc import ramped_gain
+from tests.support.prescribed import prescribed_acceleration, prescribed_energy
 
 FUNNEL = Funnel(
     slice_lower=np.array([0.0, -1.0, -1.0]),

@@ -3,10 +3,11 @@
 import numpy as np
 import pytest
 
-from coop_drake.laws import Funnel, ScheduledGains, funnel_bounds, prescribed_acceleration, transition_gains
+from coop_drake.laws import Funnel, ScheduledGains, funnel_bounds, transition_gains
 from coop_drake.laws.readiness import interval_margin
 from paper import printed
 from paper.table_1 import CORRECTED
+from tests.support.prescribed import prescribed_acceleration
 from tests.support.table_1 import table_transitions
 
 ONE_AXIS = {

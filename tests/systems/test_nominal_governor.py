@@ -120,8 +120,6 @@ def test_refusals():
     other = replace(cells[1], gains=replace(cells[1].gains, stiffness=70.0))
     with pytest.raises(ValueError, match="the same K in all cells"):
         NominalGovernor([cells[0], other, cells[2]], motion)
-    with pytest.raises(TypeError, match="harmonic maps"):
-        NominalGovernor([replace(cell, field=lambda point: point) for cell in cells], motion)
     with pytest.raises(RuntimeError, match="object_state"):
         evaluate(NominalGovernor(cells, motion), {"current_cell": [0.0, 0.0]}, "governor_command")
     assert BUDGET.period == motion.period

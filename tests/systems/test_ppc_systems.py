@@ -2,9 +2,10 @@ import numpy as np
 import pytest
 from pydrake.systems.analysis import Simulator
 
-from coop_drake.laws import funnel_bounds, prescribed_acceleration
+from coop_drake.laws import funnel_bounds
 from coop_drake.laws.ppc import ramped_gain
 from coop_drake.systems import AxisPpc, axis_laws
+from tests.support.prescribed import prescribed_acceleration
 from tests.support.small_plan import small_plan
 from tests.support.system_checks import evaluate, port_sizes
 

@@ -2,9 +2,11 @@ import numpy as np
 import pytest
 
 from coop_drake.geometry.polygons import BoundaryDistance
+from coop_drake.harmonic_maps import VelocityField
 from coop_drake.systems import GovernedCell, ReadyMonitor, axis_laws
 from coop_drake.systems.kernels import ready_conditions
 from tests.support.readiness import margin_of
+from tests.support.small_loop import small_maps
 from tests.support.small_plan import GOAL_POSE, POSITION_TOLERANCE, small_plan, stiffer_and_stiffer
 from tests.support.system_checks import evaluate
 
@@ -21,8 +23,8 @@ INPUTS = {
 @pytest.fixture
 def cells():
     return [
-        GovernedCell(BoundaryDistance(cell.tidied), lambda point: 0.0 * point, transition.gains)
-        for cell, transition in zip(PLAN.cells, PLAN.transitions, strict=True)
+        GovernedCell(BoundaryDistance(cell.tidied), VelocityField(field_map), transition.gains)
+        for cell, field_map, transition in zip(PLAN.cells, small_maps(), PLAN.transitions, strict=True)
     ]
 
 

@@ -4,9 +4,11 @@ import numpy as np
 import pytest
 
 from coop_drake.geometry.polygons import BoundaryDistance
+from coop_drake.harmonic_maps import VelocityField
 from coop_drake.laws import governed_acceleration, governor_velocity
 from coop_drake.laws.governor import object_energy_margin
 from coop_drake.systems import GovernedCell, ReferenceGovernor
+from tests.support.small_loop import small_maps
 from tests.support.small_plan import small_plan
 from tests.support.system_checks import evaluate
 
@@ -18,15 +20,11 @@ INPUTS = {
 }
 
 
-def straight_to(target):
-    return lambda point: target - point
-
-
 @pytest.fixture
 def cells():
     return [
-        GovernedCell(BoundaryDistance(cell.tidied), straight_to(transition.target), transition.gains)
-        for cell, transition in zip(PLAN.cells, PLAN.transitions, strict=True)
+        GovernedCell(BoundaryDistance(cell.tidied), VelocityField(field_map), transition.gains)
+        for cell, field_map, transition in zip(PLAN.cells, small_maps(), PLAN.transitions, strict=True)
     ]
 
 

@@ -6,8 +6,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
-from coop_drake.laws import Funnel, funnel_bounds, prescribed_acceleration, prescribed_energy
+from coop_drake.laws import Funnel, funnel_bounds
 from coop_drake.laws.ppc import ramped_gain
+from tests.support.prescribed import prescribed_acceleration, prescribed_energy
 from tests.truths.test_funnels import funnels
 
 inside = st.floats(0.05, 0.95)
