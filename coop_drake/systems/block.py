@@ -69,12 +69,6 @@ class Block(LeafSystem):
         """As Drake's; the port does not keep the block alive once it is released."""
         return super().DeclareVectorOutputPort(name, model, self._loosely(calc), *rest)
 
-    def DeclareAbstractOutputPort(
-        self, name: str, alloc: Callable[[], Any], calc: Callable[..., None], *rest: Any
-    ) -> Any:
-        """As Drake's; the port does not keep the block alive once it is released."""
-        return super().DeclareAbstractOutputPort(name, self._loosely(alloc), self._loosely(calc), *rest)
-
     def declare_update(self, update: Callable[..., Any], period: float | None, offset: float = 0.0) -> None:
         """Declare a discrete update in every step, or every ``period`` from ``offset`` on [s]."""
         if period is None:

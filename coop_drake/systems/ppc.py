@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
 
@@ -241,10 +241,10 @@ class NominalAxes(Block):
         nominal = self.discrete_state_ticket(group)
         # Without these the law's answer would seem to depend on itself.
         for name, size, calc, read in (
-            ("nominal_object", 6, self._write_object, {of_object}),
-            ("nominal_robot", 2 * (2 + axes), self._write_robot, {of_robot}),
-            ("object_ahead", 6, self._write_object_ahead, {of_object, asked}),
-            ("robot_ahead", 2 * (2 + axes), self._write_robot_ahead, {of_robot, asked}),
+            ("nominal_object", 6, partial(self._show_object, self.states_of), {of_object}),
+            ("nominal_robot", 2 * (2 + axes), partial(self._show_robot, self.states_of), {of_robot}),
+            ("object_ahead", 6, partial(self._show_object, self._ahead), {of_object, asked}),
+            ("robot_ahead", 2 * (2 + axes), partial(self._show_robot, self._ahead), {of_robot, asked}),
             ("nominal_axes", 2 * axes, self._write_axes, set()),
             ("pulled_axes", axes, self._write_pulled, {of_object, of_robot, asked}),
         ):
@@ -268,27 +268,19 @@ class NominalAxes(Block):
         carry_axes(self.states_of(context)[:3], self._law.Eval(context), time, motion.lag, later)
         return later
 
-    def _write_object(self, context: Context, output: BasicVector) -> None:
-        self._show_object(context, self.states_of(context), output)
-
-    def _write_object_ahead(self, context: Context, output: BasicVector) -> None:
-        self._show_object(context, self._ahead(context), output)
-
-    def _show_object(self, context: Context, states: FloatArray, output: BasicVector) -> None:
-        shown = output.get_mutable_value()
+    def _show_object(
+        self, states_of: Callable[[Context], FloatArray], context: Context, output: BasicVector
+    ) -> None:
+        shown, states = output.get_mutable_value(), states_of(context)
         shown[:] = self._object.Eval(context)
         shown[2], shown[5] = states[0, 0], states[1, 0]
 
-    def _write_robot(self, context: Context, output: BasicVector) -> None:
-        self._show_robot(context, self.states_of(context), output)
-
-    def _write_robot_ahead(self, context: Context, output: BasicVector) -> None:
-        self._show_robot(context, self._ahead(context), output)
-
-    def _show_robot(self, context: Context, states: FloatArray, output: BasicVector) -> None:
+    def _show_robot(
+        self, states_of: Callable[[Context], FloatArray], context: Context, output: BasicVector
+    ) -> None:
         shown = output.get_mutable_value()
         shown[:] = self._robot.Eval(context)
-        place_on_axes(states, self._motion.mounting, shown)
+        place_on_axes(states_of(context), self._motion.mounting, shown)
 
     def _write_axes(self, context: Context, output: BasicVector) -> None:
         output.SetFromVector(self.states_of(context)[:2].ravel())

@@ -136,9 +136,3 @@ def test_only_switches_jumps_holds_what_is_predicted_and_what_models_failures_ar
         "NominalGovernor",
     }
     assert remembering == laws | holds | failures | {"TeamLink", "DepartureMonitor"}
-
-
-@pytest.mark.parametrize("name", BLOCKS)
-def test_a_block_is_small(name):
-    lines, _ = inspect.getsourcelines(getattr(systems, name))
-    assert len(lines) <= 120
