@@ -36,7 +36,7 @@ class DirectExchange:
     Attributes:
         messages: Every message of the team so far: number of the sample, sender (None for the supervisor).
         membership: Whether the drives brake.
-        damping: With which the drives of each robot brake, see ``laws.braking``.
+        damping: With which the drives of each robot brake, see ``laws.actuators``.
     """
 
     def __init__(self, gaps: Sequence[tuple[int, int]] = ()) -> None:
