@@ -250,7 +250,7 @@ class PositionTube:
         acceleration: Largest acceleration that a robot commands for the object's origin, times the factor by
             which its masses may be too large: its forces over the true mass [m/s^2].
         ahead: Largest distance e + t e' to which its departures e and e' at a sample would take it within the
-            time t for which nobody may know of them, see ``laws/departure.py`` [m].
+            time t for which nobody may know of them, see ``laws/readiness.py`` [m].
     """
 
     tracking_stiffness: Bound
@@ -294,7 +294,7 @@ class AxisTracking:
 
 @dataclass(frozen=True)
 class Alarms:
-    """The levels that all transitions of a plan with a budget have in common, see ``laws/departure.py``.
+    """The levels that all transitions of a plan with a budget have in common, see ``laws/readiness.py``.
 
     Those of angles and joints stand in every transition's ``tolerance``.
 
@@ -325,7 +325,7 @@ class Restart:
     """What a team that begins its current cell anew from rest keeps to, and how far it then departs.
 
     All axes go slowly to the middle of their goal intervals while the object's position rests, see
-    ``laws/beginning.py``. A cell can be begun anew from a rest in which every axis is inside its slice by
+    ``laws/actuators.py``. A cell can be begun anew from a rest in which every axis is inside its slice by
     more than its departure here, and the object inside the governed region: then every axis stays in its
     slice, and the object in its tube.
 
