@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
-from typing import Any
 
 import numpy as np
 from pydrake.systems.framework import BasicVector, Context, DiscreteValues, EventStatus
@@ -52,7 +51,7 @@ class GovernedCell:
         return self.gains.governor_row(self.before or self.gains)
 
     @property
-    def known(self) -> tuple[Any, ...]:
+    def known(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
         """What compiled laws of the cell take first: the row, edges of the governed set, and the field."""
         return self.row, self.clearance.edges, *self.field.kernel_arguments
 
