@@ -12,6 +12,7 @@ from coop_drake.apart.membership import TOLERATED
 from coop_drake.apart.messages import (
     KINDS,
     LONGEST,
+    MOST_ITEMS,
     MOST_ROBOTS,
     PROTOCOL,
     SUPERVISOR,
@@ -73,9 +74,9 @@ first numbered message of session 7, about cell 3, is `[7, 1, {{"type": "Ready",
 true}}]`, in bytes `{_EXAMPLE}`.
 
 All fields must be there, and no others. Integers have no sign and at most 32 bits. Real numbers are finite
-where nothing else is said; whole ones may be sent as integers. Lists have at most 4096 items, a message at
-most {LONGEST} bytes. A process has an index: k for robot k, of at most {MOST_ROBOTS}, {SUPERVISOR} for the
-supervisor and {WORLD} for the world.
+where the type is not "any real"; whole ones may be sent as integers. Lists have at most {MOST_ITEMS} items,
+a message at most {LONGEST} bytes. A process has an index: k for robot k, of at most {MOST_ROBOTS},
+{SUPERVISOR} for the supervisor and {WORLD} for the world.
 
 ## Connections and sessions
 
@@ -121,7 +122,7 @@ def _type(kind: Any) -> str:
         return f"list of {_type(kind.item_type)}s"
     if isinstance(kind, Metadata):
         return _type(kind.type) + (f" [{kind.extra['unit']}]" if kind.extra else "")
-    return words[type(kind)]
+    return "any " * (isinstance(kind, FloatType) and kind.le is None) + words[type(kind)]
 
 
 def _world() -> str:
