@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from heapq import heappop, heappush
 from itertools import combinations
-from math import sqrt
+from math import inf, sqrt
 
 import numpy as np
 import shapely
@@ -17,7 +17,7 @@ from coop_drake.errors import GeometryError
 from coop_drake.geometry.distances import squared_distance
 from coop_drake.geometry.polygons import BoundaryDistance, edges_of, extent_of
 from coop_drake.jit import compiled
-from coop_drake.tree.pose import FloatArray, IntArray
+from coop_drake.tree.pose import FloatArray
 
 # Cuts the edges of rings into pieces that are short where the opposite wall is near.
 
@@ -176,101 +176,54 @@ def medial_graph(polygon: Polygon, distance: BoundaryDistance) -> tuple[Graph, F
     return Graph(nodes, pairs[inside], clearance[inside], length[inside]), node_clearance
 
 
-def widest_path(graph: Graph, start: int, end: int) -> IndexArray | None:
+def widest_path(graph: Graph, start: int, end: int) -> list[int] | None:
     """Nodes of the path whose narrowest edge is widest, the shortest among equally wide, or None.
 
-    No edge of the graph occurs twice.
+    Edges are added from the widest to the narrowest until they join the nodes, with all that are as wide as
+    the last one. Among these Dijkstra's algorithm finds the shortest path.
     """
     order = np.argsort(-graph.clearance, kind="stable")
-    pairs = np.ascontiguousarray(graph.pairs[order], dtype=np.int64)
-    count = _joining(pairs, graph.clearance[order], len(graph.nodes), start, end)
-    if count == 0:
+    edges = zip(
+        graph.pairs[order].tolist(),
+        graph.clearance[order].tolist(),
+        graph.length[order].tolist(),
+        strict=True,
+    )
+    around: list[list[tuple[int, float]]] = [[] for _ in graph.nodes]
+    joined_to, narrowest = list(range(len(graph.nodes))), -inf
+
+    def root(node: int) -> int:
+        """The node that stands for all that a node is joined to; paths to it become shorter."""
+        while joined_to[node] != node:
+            joined_to[node] = joined_to[joined_to[node]]
+            node = joined_to[node]
+        return node
+
+    for (one, other), clearance, length in edges:
+        if clearance < narrowest:
+            break
+        around[one].append((other, length))
+        around[other].append((one, length))
+        joined_to[root(one)] = root(other)
+        if narrowest == -inf and root(start) == root(end):
+            narrowest = clearance
+    if narrowest == -inf:
         return None
-    before = _shortest(pairs[:count], graph.length[order[:count]], len(graph.nodes), start, end)
-    chain = [end]
-    while chain[-1] != start:
-        chain.append(int(before[chain[-1]]))
-    return np.array(chain[::-1], dtype=np.intp)
-
-
-@compiled
-def _joining(pairs: IntArray, clearance: FloatArray, count: int, start: int, end: int) -> int:
-    """Number of edges, the widest first, that join two nodes, with all that are as wide as the last of them.
-
-    Args:
-        pairs: Ends of the edges, shape (edges, 2).
-        clearance: Their clearances, falling, shape (edges,) [m].
-        count: Number of nodes.
-        start: The one node.
-        end: The other node.
-
-    Returns:
-        The number, 0 if the edges do not join the nodes.
-    """
-    joined_to = np.arange(count)
-    for k in range(len(pairs)):
-        joined_to[_root(joined_to, pairs[k, 0])] = _root(joined_to, pairs[k, 1])
-        if _root(joined_to, start) == _root(joined_to, end):
-            last = k + 1
-            while last < len(pairs) and clearance[last] == clearance[k]:
-                last += 1
-            return last
-    return 0
-
-
-@compiled(borrows=True)
-def _root(joined_to: IntArray, node: int) -> int:
-    """The node that stands for all that a node is joined to; paths to it become shorter."""
-    while joined_to[node] != node:
-        joined_to[node] = joined_to[joined_to[node]]
-        node = joined_to[node]
-    return node
-
-
-@compiled
-def _shortest(pairs: IntArray, length: FloatArray, count: int, start: int, end: int) -> IntArray:
-    """Dijkstra's algorithm on an undirected graph.
-
-    Args:
-        pairs: Ends of the edges, shape (edges, 2).
-        length: Their lengths, shape (edges,) [m].
-        count: Number of nodes.
-        start: Where paths begin.
-        end: Where the search stops; a path must exist.
-
-    Returns:
-        For each node that was reached the one before it, shape (nodes,).
-    """
-    first_of = np.zeros(count + 1, np.int64)
-    for k in range(len(pairs)):
-        first_of[pairs[k, 0] + 1] += 1
-        first_of[pairs[k, 1] + 1] += 1
-    for i in range(count):
-        first_of[i + 1] += first_of[i]
-    edges, filled = np.empty(2 * len(pairs), np.int64), first_of.copy()
-    for k in range(len(pairs)):
-        for side in range(2):
-            node = pairs[k, side]
-            edges[filled[node]] = k
-            filled[node] += 1
-    before, distance = np.full(count, -1), np.full(count, np.inf)
-    distance[start] = 0.0
-    waiting = [(0.0, start)]
+    before, distance, waiting = {start: start}, {start: 0.0}, [(0.0, start)]
     while waiting:
         reached, node = heappop(waiting)
         if node == end:
             break
         if reached > distance[node]:
             continue
-        for place in range(first_of[node], first_of[node + 1]):
-            k = edges[place]
-            other = pairs[k, 0] + pairs[k, 1] - node
-            longer = reached + length[k]
-            if longer < distance[other]:
-                distance[other] = longer
-                before[other] = node
-                heappush(waiting, (longer, other))
-    return before
+        for other, length in around[node]:
+            if reached + length < distance.get(other, inf):
+                distance[other], before[other] = reached + length, node
+                heappush(waiting, (reached + length, other))
+    chain = [end]
+    while chain[-1] != start:
+        chain.append(before[chain[-1]])
+    return chain[::-1]
 
 
 def _voronoi(samples: FloatArray) -> tuple[FloatArray, IndexArray, IndexArray]:
@@ -437,7 +390,7 @@ class PassageFinder:
         length = np.linalg.norm(second - first, axis=1)
         return Graph(nodes, pairs[inside], clearance[inside], length[inside])
 
-    def _wider(self, passage: Passage, nodes: FloatArray, chain: IndexArray | None) -> Passage:
+    def _wider(self, passage: Passage, nodes: FloatArray, chain: list[int] | None) -> Passage:
         """The wider one of a passage and a chain of nodes, if there is a chain."""
         if chain is None:
             return passage

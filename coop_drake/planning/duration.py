@@ -191,20 +191,6 @@ def _ready(
 
 
 @compiled(borrows=True)
-def _write_jumps(
-    state: FloatArray, time: float, table: FloatArray, next_table: FloatArray, jumps: FloatArray
-) -> None:
-    """Write by how much the accelerations of all axes jump at a switch now, shape (m,)."""
-    m = table.shape[0]
-    for i in range(m):
-        x, rate = state[6 + i], state[6 + m + i]
-        if table[i, REST_RATE] > 0.0:
-            jumps[i] = rest_jump(table[i], next_table[i])
-        else:
-            jumps[i] = track_row(table[i], time, x, rate)[0] - track_row(next_table[i], 0.0, x, rate)[0]
-
-
-@compiled(borrows=True)
 def _arrived(state: FloatArray, table: FloatArray, target: FloatArray, tolerance: float) -> bool:
     """Return whether the goal is reached and the motion has ended."""
     m = table.shape[0]
@@ -216,39 +202,20 @@ def _arrived(state: FloatArray, table: FloatArray, target: FloatArray, tolerance
 
 
 @compiled(borrows=True)
-def axis_frequency(row: FloatArray, time: float, position: float, saturation: float) -> float:
-    """Return the angular frequency with which the log term of (18) pulls at an axis where it is now [rad/s].
-
-    Args:
-        row: The axis, a row of an ``axis_table``.
-        time: Time since the cell was entered [s].
-        position: x [rad or m].
-        saturation: Smallest distance to a funnel bound that counts, over the funnel's width [-].
-    """
-    lower, upper, _, _, _, _ = bounds_of(row, time)
-    width = upper - lower
-    dl = min(max(position - lower, saturation * width), width)
-    du = min(max(upper - position, saturation * width), width)
-    return width / (dl * du) * sqrt(row[LOG_GAIN] * (1.0 + abs(np.log(dl / du))))
-
-
-@compiled(borrows=True)
 def _steps(state: FloatArray, time: float, row: FloatArray, table: FloatArray) -> int:
-    """Return the number of integration steps until the next check, enough for the fastest motion now."""
+    """Return the number of integration steps until the next check, enough for the fastest motion now.
+
+    That is the spring's, p_G's, or the one with which the log term of (18) pulls at an axis where it is now.
+    """
     fastest = max(sqrt(row[STIFFNESS]), ATTRACTION_RATE)
     for i in range(table.shape[0]):
-        fastest = max(fastest, axis_frequency(table[i], time, state[6 + i], table[i, SATURATION]))
+        lower, upper, _, _, _, _ = bounds_of(table[i], time)
+        width, position = upper - lower, state[6 + i]
+        dl = min(max(position - lower, table[i, SATURATION] * width), width)
+        du = min(max(upper - position, table[i, SATURATION] * width), width)
+        pull = width / (dl * du) * sqrt(table[i, LOG_GAIN] * (1.0 + abs(np.log(dl / du))))
+        fastest = max(fastest, pull)
     return int(min(max(np.ceil(PERIOD * fastest / RADIANS_PER_STEP), FEWEST_STEPS), MOST_STEPS))
-
-
-@compiled(borrows=True)
-def _note_peaks(state: FloatArray, rates: FloatArray, peaks: FloatArray) -> None:
-    """Write the speed of the object and the rates and accelerations of all axes that exceed those before."""
-    peaks[0] = max(peaks[0], hypot(state[2], state[3]))
-    m = (peaks.size - 1) // 2
-    for i in range(m):
-        peaks[1 + i] = max(peaks[1 + i], abs(state[6 + m + i]))
-        peaks[1 + m + i] = max(peaks[1 + m + i], abs(rates[6 + m + i]))
 
 
 @compiled
@@ -289,7 +256,7 @@ def cross_cell(
     Returns:
         Time that passed [s]; infinite beyond the limit.
     """
-    n = state.size
+    n, m = state.size, table.shape[0]
     k1, k2, k3, k4 = np.empty(n), np.empty(n), np.empty(n), np.empty(n)
     time, next_stiffness = 0.0, governed_gains(next_row, 0.0)[0]
     while time <= time_limit:
@@ -297,7 +264,14 @@ def cross_cell(
             if _arrived(state, table, path[-1], inradius):
                 return time
         elif _ready(state, time, table, inradius, next_edges, next_stiffness, next_table):
-            _write_jumps(state, time, table, next_table, jumps)
+            for i in range(m):
+                x, rate = state[6 + i], state[6 + m + i]
+                if table[i, REST_RATE] > 0.0:
+                    jumps[i] = rest_jump(table[i], next_table[i])
+                else:
+                    jumps[i] = (
+                        track_row(table[i], time, x, rate)[0] - track_row(next_table[i], 0.0, x, rate)[0]
+                    )
             return time
         steps = _steps(state, time, row, table)
         h = PERIOD / steps
@@ -308,7 +282,10 @@ def cross_cell(
             _rates(state + 0.5 * h * k2, t + 0.5 * h, edges, path, row, table, jumps, k3)
             _rates(state + h * k3, t + h, edges, path, row, table, jumps, k4)
             state += h / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4)
-            _note_peaks(state, k1, peaks)
+            peaks[0] = max(peaks[0], hypot(state[2], state[3]))
+            for i in range(m):
+                peaks[1 + i] = max(peaks[1 + i], abs(state[6 + m + i]))
+                peaks[1 + m + i] = max(peaks[1 + m + i], abs(k1[6 + m + i]))
         time += PERIOD
     return np.inf
 

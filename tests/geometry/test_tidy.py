@@ -43,13 +43,6 @@ def test_a_tidy_cell_is_inside_whole_and_joins_the_ends(floor_with_ends):
     assert PassageFinder(tidied).find(*ends).clearance >= 0.79 * PassageFinder(safe).find(*ends).clearance
 
 
-@given(floors_with_ends())
-@settings(max_examples=20)
-def test_the_same_cell_gives_the_same_bits(floor_with_ends):
-    safe, ends = floor_with_ends
-    assert tidy_cell(safe, ends).wkb == tidy_cell(safe, ends).wkb
-
-
 def test_a_clean_convex_room_is_kept_but_for_the_guard():
     tidied = tidy_cell(box(0, 0, 4, 3), [np.array([1.0, 1.0]), np.array([3.0, 2.0])])
     assert tidied.area == pytest.approx(12.0, rel=1e-5)

@@ -192,15 +192,6 @@ def test_map_has_the_mean_value_property(mapped):
     np.testing.assert_allclose(T.mean(axis=1), mapped(centres)[0], atol=1e-9)
 
 
-def test_walls_vertices_and_the_outside_have_defined_values(mapped):
-    ring = np.asarray(mapped.region.exterior.coords)
-    everywhere = np.concatenate((ring, 0.5 * (ring[1:] + ring[:-1]), ring + 1e-3, ring - 0.7, ring * 1e3))
-    T, J = mapped(everywhere)
-    assert np.isfinite(T).all()
-    assert np.isfinite(J).all()
-    np.testing.assert_allclose(np.hypot(*T[: len(ring)].T), 1.0, atol=1e-5)
-
-
 def test_walls_are_the_limit_from_inside(mapped):
     walls, normals = domains.off_wall(mapped.region, 0.0)
     step = 1e-7
@@ -236,31 +227,6 @@ def test_same_question_same_answer():
 
 
 ELL = Polygon([(0, 0), (2, 0), (2, 1), (1, 1), (1, 2), (0, 2)])
-
-
-@pytest.mark.parametrize(
-    ("domain", "goal"),
-    [
-        domains.square(),
-        domains.u_corridor(),
-        domains.warehouse(),
-        domains.needle(10),
-        domains.blade(350),
-        domains.two_rooms(0.01),
-        domains.two_rooms(0.1),
-        domains.bevelled(1e-3),
-        domains.bevelled(1e-6),
-        domains.rounded_room(),
-    ],
-    ids=lambda value: None,
-)
-def test_clean_and_nasty_domains_are_accurate(domain, goal):
-    accuracy = HarmonicMap(domain, goal).accuracy
-    holes = len(domain.interiors)
-    assert accuracy.residual <= 1e-6
-    assert accuracy.error_estimate == (2 * holes + 1) * accuracy.residual
-    assert accuracy.samples > accuracy.unknowns
-    assert 1.0 < accuracy.condition < 1e7
 
 
 def test_more_is_spent_where_more_is_asked():
@@ -361,7 +327,7 @@ def test_disk_is_kept_and_nothing_is_folded(walled):
     assert np.mean(certain) > 0.6
 
 
-def test_walls_and_vertices_have_values(walled):
+def test_walls_vertices_and_the_outside_have_values(walled):
     rings = [walled.region.exterior, *walled.region.interiors]
     vertices = np.concatenate([shapely.get_coordinates(ring) for ring in rings])
     walls, _ = domains.off_wall(walled.region, 0.0, 11)
@@ -371,9 +337,10 @@ def test_walls_and_vertices_have_values(walled):
         assert np.isfinite(T).all()
         assert np.isfinite(J).all()
         assert (np.hypot(*T.T) <= 1.0 + 1.5 * walled.accuracy.error_estimate).all()
+    for outside in (vertices - 0.7, 1e3 * vertices):
+        assert all(np.isfinite(values).all() for values in walled(outside))
 
 
-WAREHOUSE, GOAL = domains.warehouse()
 AGAINST_SINGLE_LAYER = {
     "square": (*domains.square(), 40),
     "U corridor": (*domains.u_corridor(), 40),

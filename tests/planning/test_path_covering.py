@@ -58,13 +58,6 @@ def test_fixed_gains_get_boxes_of_their_own(base):
     assert plan_time(fixed) < plan_time(own)
 
 
-def test_the_same_channel_gives_the_same_boxes(base, quick):
-    again = quickest_plan(*base, ScheduledGains(), gain_set_name="scheduled")
-    for first, second in zip(quick.cells, again.cells, strict=True):
-        assert first.tidied.wkb == second.tidied.wkb
-        np.testing.assert_array_equal(first.lower, second.lower)
-
-
 def test_targets_lie_in_the_cores_of_both_boxes_and_cores_inside(base):
     problem, channel = base
     found = cover_path(problem, channel.path, channel.margin, ScheduledGains())

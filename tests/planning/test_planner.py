@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from shapely import box
 
-from coop_drake.answers import BeyondLimits, Found, Infeasible, SearchReport, Undecided, load_plan, save_plan
+from coop_drake.answers import BeyondLimits, Found, Infeasible, SearchReport, Undecided
 from coop_drake.answers.limits import Refusal
 from coop_drake.answers.plan_file import check_plan, plan_document
 from coop_drake.errors import StallError
@@ -251,13 +251,6 @@ def test_the_plan_is_executable_and_tidy(base):
     for cell in made.cells:
         assert not cell.tidied.interiors
     assert np.mean([len(cell.tidied.exterior.coords) for cell in made.cells]) < 25
-
-
-def test_the_plan_on_disk_is_the_same_plan(base, tmp_path):
-    _, made = base
-    first = save_plan(made, tmp_path / "first.json")
-    second = save_plan(load_plan(first), tmp_path / "second.json")
-    assert first.read_bytes() == second.read_bytes()
 
 
 def test_the_transport_arrives_in_time_and_stays_in_its_cells(base):

@@ -81,19 +81,6 @@ def test_a_spent_budget_is_no_proof(monkeypatch: pytest.MonkeyPatch) -> None:
     assert 0.0 < channel.mixed[0].width_fraction <= 1.0
 
 
-@pytest.mark.no_cover
-def test_same_question_same_answer() -> None:
-    first, second = (find_channel(transport())[0] for _ in range(2))
-    assert isinstance(first, Channel)
-    assert isinstance(second, Channel)
-    assert first.margin == second.margin
-    for a, b in zip(first.boxes, second.boxes, strict=True):
-        assert a.polygon.wkb == b.polygon.wkb
-        assert a.core.wkb == b.core.wkb
-        assert a.lower.tobytes() == b.lower.tobytes()
-        assert a.upper.tobytes() == b.upper.tobytes()
-
-
 def test_a_start_near_a_wall_does_not_forbid_a_margin() -> None:
     problem = case("base")
     start = problem.start.copy()

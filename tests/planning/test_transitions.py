@@ -145,15 +145,6 @@ def test_reschedule_changes_gains_alone():
         assert first.gains.stiffness == second.gains.stiffness
 
 
-def test_the_same_channel_gives_the_same_plan():
-    first, second = plan_of(*bent_channel()), plan_of(*bent_channel())
-    for a, b in zip(first.cells, second.cells, strict=True):
-        assert a.tidied.wkb == b.tidied.wkb
-    for a, b in zip(first.transitions, second.transitions, strict=True):
-        np.testing.assert_array_equal(a.target, b.target)
-        assert (a.neck, a.length, a.inradius) == (b.neck, b.length, b.inradius)
-
-
 def test_a_passage_of_half_a_millimetre_is_refused_by_name():
     problem, channel = corridor()
     aisle = box(0, -1, 1.4, 1).union(box(1.3, 0, 1.8, 0.0005)).union(box(1.7, -1, 3, 1))
