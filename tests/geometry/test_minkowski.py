@@ -6,7 +6,6 @@ from shapely import MultiPoint, MultiPolygon, Polygon, box, union_all
 from shapely.affinity import translate
 
 from coop_drake.geometry import minkowski
-from coop_drake.geometry import minkowski as large_floors
 from coop_drake.geometry.minkowski import SAFE_SIDE, FreeSpace, common, to_polygon
 from coop_drake.geometry.polygons import polygon_rings
 from tests.support.trees import room
@@ -53,12 +52,12 @@ def test_the_difference_for_large_floors_equals_the_reference(points: list[tuple
     if footprint is None:
         return
     space = FreeSpace(polygon_rings(room()))
-    found = as_shapely(large_floors.fitting_on_large_floor(space.rings, space.edges, footprint))
+    found = as_shapely(minkowski.fitting_on_large_floor(space.rings, space.edges, footprint))
     assert found.symmetric_difference(exact_difference(room(), footprint)).area < 1e-5
 
 
 def test_saw_teeth_are_subtracted_alike_by_few_and_by_many_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    teeth = large_floors.LARGE // 2
+    teeth = minkowski.LARGE // 2
     x = np.linspace(4.0, 0.0, 2 * teeth)
     saw = np.column_stack([x, np.where(np.arange(2 * teeth) % 2, 3.0, 3.001)])
     space = FreeSpace([np.vstack([[[0.0, 0.0], [4.0, 0.0]], saw])])
@@ -69,7 +68,6 @@ def test_saw_teeth_are_subtracted_alike_by_few_and_by_many_at_once(monkeypatch: 
     shifted = few.translate((0.013, 0.011))
     both = common(few, shifted).area()
     monkeypatch.setattr(minkowski, "LARGE", np.inf)
-    monkeypatch.setattr(large_floors, "LARGE", np.inf)
     many = space.minus(disc)
     assert few.area() == pytest.approx(many.area(), abs=1e-6)
     assert (few - many).area() + (many - few).area() < 1e-6

@@ -29,8 +29,6 @@ from coop_drake.planning.cells.graph import (
 from coop_drake.planning.duration import SETTLING_TIME
 from coop_drake.tree.component_tree import axis_levers
 
-# The order of splits: which slices of a path are halved next, and along which axis (strong branching).
-
 # Strong branching: halve a cell of a path on trial, and see what remains of the path.
 
 
