@@ -53,7 +53,6 @@ def axis_table(funnel: Funnel, gains: TransitionGains) -> FloatArray:
     return table
 
 
-@compiled(borrows=True)
 def write_row(
     row: FloatArray,
     intervals: tuple[float, float, float, float],

@@ -342,7 +342,6 @@ def ready_conditions(
     ]
 
 
-@compiled(borrows=True)
 def robot_ready(
     table: FloatArray,
     next_table: FloatArray,
