@@ -18,9 +18,9 @@ from coop_drake.answers import Found
 from coop_drake.answers.budget import Budget
 from coop_drake.answers.plan import Plan
 from coop_drake.laws.axis_table import axis_table
-from coop_drake.planning.budget.axis_departure import axis_loop
-from coop_drake.planning.budget.position_tube import PositionGains, position_tubes
-from coop_drake.planning.budget.transitions import UnprovedTransition, follow_transitions
+from coop_drake.planning.budget.fitting import UnprovedTransition, follow_transitions
+from coop_drake.robustness.axis_departure import axis_loop
+from coop_drake.robustness.position import PositionGains, position_tubes
 
 _LARGEST = {
     "delay": 0.1, "lag": 0.1, "angle_noise": 0.1, "rate_noise": 3.0, "model_error": 0.95,

@@ -8,7 +8,7 @@ import numpy as np
 
 from coop_drake.jit import compiled
 from coop_drake.laws.nominal import nominal_flow, tracked_acceleration
-from coop_drake.planning.budget.position_tube import PositionGains
+from coop_drake.robustness.position import PositionGains
 from coop_drake.tree.pose import FloatArray
 
 

@@ -1,31 +1,262 @@
-"""How far the axes of a plan may depart from their nominal motions in one transition, period by period.
-
-The departure e = x - x^ of an axis is the sum of its loop's responses to what enters it, see
-``axis_departure.py``. In one period this is at most
-
-    d = |epsilon| (|a^| + c(w^)) + c(w^ + e'_1) - c(w^) + w + (1 + epsilon - f) q,
-
-with the nominal rates w^ of all axes, and c the largest acceleration that rates alone cause where nothing is
-commanded: robots command what balances it at the nominal rates, with masses that are wrong by epsilon. e'_1
-is what the first term and w alone cause, w being ``axis_error`` and what the friction of joints causes: what
-noise adds is small and of any sign. All of this is known from the periods before, so that one pass forward in
-time bounds the departures of all axes.
-"""
+"""How far axes may depart from their nominal motions under a budget, and what is commanded of them."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from math import inf
 from typing import NamedTuple
 
 import numpy as np
 
+from coop_drake.answers.axis_tracking import AxisTracking
+from coop_drake.answers.budget import Budget
 from coop_drake.jit import compiled
-from coop_drake.laws.nominal import lag_factors
-from coop_drake.planning.budget.alarms import axis_errors
-from coop_drake.planning.budget.axis_departure import LATE, AxisLoop
-from coop_drake.planning.budget.axis_sets import AxisSets
-from coop_drake.planning.budget.axis_tube import ACCELERATION, COLUMNS, V
+from coop_drake.laws.nominal_axes import lag_factors
+from coop_drake.laws.sampling import whole_periods
+from coop_drake.robustness.alarms import axis_errors, mistaken
+from coop_drake.robustness.nominal_axes import ACCELERATION, COLUMNS, AxisSets, V
 from coop_drake.tree.pose import FloatArray
+
+# How far an axis may depart from its nominal motion under a budget.
+#
+# Let e = x - x^ be the departure of an axis from its nominal motion, see ``laws/nominal_axes.py``. Robots
+# command, at sample k and with measurements that are m periods old, L + q_k with the pull
+#
+# q_k = -K_a (e_(k-m) + n_x) - zeta_a (e'_(k-m) + n_v),
+#
+# which acts with the same lag as L. With the acceleration a^ of the nominal motion, the lagged pull q and
+# the factor 1 + epsilon by which the model makes accelerations too large, f being the middle of a part of
+# its range,
+#
+# e'' = f q + (1 + epsilon - f) q + epsilon a^ + w.
+#
+# The loop e'' = f q is linear and does not vary in time, so that |e| is at most the sum over all samples of
+# its responses' magnitudes times the largest size of what enters: noise of a command, and accelerations.
+# Hand- overs and funnels do not appear in it. Only a^ is larger in one transition than in another: what
+# entered longer ago than ``MEMORY`` is counted with its largest size in the whole plan.
+#
+# Where the age of measurements may be wrong by s, what was measured belongs to another instant than the
+# nominal state with which it is compared. So n_x is larger by s times the largest |x'| of the axis at any
+# time, and n_v by s times its largest |x''|, which the plan states (``AxisTracking``).
+
+MODEL_PARTS = 5
+"""Parts into which the range of the model's error is cut [-]; within each only the rest is a disturbance."""
+
+HORIZON = 4.0
+"""Longest time for which responses are summed [s]."""
+
+LEFT = 1e-9
+"""Responses to a unit departure are followed until they are below this [-]; a loop in which they stay above
+it for ``HORIZON`` is refused."""
+
+MEMORY = 0.3
+"""Time for which the accelerations of former transitions count with their own sizes [s]: less than a
+hundredth of a response of typical gains is left after it."""
+
+STIFFNESSES = (100.0, 150.0, 200.0, 250.0, 300.0, 400.0, 500.0, 700.0, 1000.0)
+"""K_a that are tried [1/s^2]; the narrowest tube is taken."""
+
+DAMPINGS = (1.2, 1.4, 1.7, 2.0, 2.5)
+"""zeta_a over the root of K_a that are tried [-]."""
+
+TYPICAL_ACCELERATION = 8.0
+"""Acceleration of a nominal motion for which the gains are chosen [rad/s^2 or m/s^2]: two thirds of the
+largest one of a funnel's bound in the shipped rule of gains."""
+
+RATE_WEIGHT = 0.01
+"""What a departure of the rate counts beside one of the axis, where gains are chosen [s]: it takes its part
+of the limit of the rate."""
+
+COMMAND_WEIGHTS = (0.0005, 0.004)
+"""What noise in a command counts beside a departure of the axis, where efforts are limited [s^2]: for stiff
+loops, as an axis with little room needs them, and for soft ones, which take small efforts."""
+
+SLACK = 1e-3
+"""Fraction by which stated bounds are wider than computed ones [-]: more than the responses after
+``HORIZON`` and another way to round need."""
+
+AWAY, FAST, PULL = range(3)
+"""What responds: e [rad or m], e' [rad/s or m/s] and the pull [rad/s^2 or m/s^2]."""
+
+COMMANDED, PUSH, OLD = range(3)
+"""To what: a unit of command in each period, a unit of acceleration, and one from before ``MEMORY``."""
+
+
+@dataclass(frozen=True)
+class AxisLoop:
+    """The loop of all axes under a budget.
+
+    Attributes:
+        tracking: Its gains.
+        budget: The departures to be tolerated.
+        sums: Of every part of the model's range the sums of responses, shape (parts, 3, 3).
+        kicks: Responses to a unit of acceleration in one period within ``MEMORY``, the oldest first, shape
+            (parts, 3, memory).
+        answers: Pull that answers a unit of command in one of the periods before, likewise, with its sign,
+            shape (parts, memory).
+    """
+
+    tracking: AxisTracking
+    budget: Budget
+    sums: FloatArray
+    kicks: FloatArray
+    answers: FloatArray
+
+    @property
+    def rest(self) -> float:
+        """By how much the model's factor may differ from f within a part [-]."""
+        return _rest(self.budget)
+
+    @property
+    def factors(self) -> list[float]:
+        """The factors f of all parts of the model's range [-]."""
+        return _factors(self.budget)
+
+    @property
+    def errors(self) -> FloatArray:
+        """Largest error of the model in every part, shape (parts,) [-]."""
+        return np.abs(np.array(self.factors) - 1.0) + self.rest
+
+    def noises(self, axes: int) -> FloatArray:
+        """Return what noise causes of x [rad or m], x' [rad/s or m/s] and the pull, (axes, parts, 3)."""
+        wrong = np.array([[self.budget.angle_noise], [self.budget.rate_noise]])
+        wrong = wrong + mistaken(self.budget, self.tracking, axes)
+        noise = self.tracking.stiffness * wrong[0] + self.tracking.damping * wrong[1]
+        caused: FloatArray = noise[:, None, None] * (self.sums[:, :, COMMANDED] + [0.0, 0.0, 1.0])
+        return caused
+
+    def typical(self) -> tuple[float, float]:
+        """Return the largest departures of a typical axis [rad or m] and of its rate [rad/s or m/s].
+
+        Errors of clocks are not counted, for they depend on how fast the axes are.
+        """
+        pushes, axes = self.sums[:, :, PUSH], max(len(self.tracking.disturbance) - 1, 1)
+        noises = self.noises(1)[0]
+        steady = axis_errors(self.budget, self.tracking, axes).mean() + self.errors * TYPICAL_ACCELERATION
+        pull = (noises[:, PULL] + steady * pushes[:, PULL]) / (1.0 - self.rest * pushes[:, PULL])
+        found = noises[:, :PULL] + (steady + self.rest * pull)[:, None] * pushes[:, :PULL]
+        away, fast = found.max(axis=0).tolist()
+        return away, fast
+
+
+@lru_cache(maxsize=8)
+def best_loop(budget: Budget, disturbance: tuple[float, ...] = (), weight: float = 0.0) -> AxisLoop | None:
+    """Return the loop with the gains for which a typical axis departs least; None where none is stable.
+
+    Args:
+        budget: The budget.
+        disturbance: As that of ``AxisTracking``.
+        weight: What noise in a command counts beside a departure, see ``COMMAND_WEIGHTS`` [s^2].
+    """
+    best, least = None, inf
+    for stiffness in STIFFNESSES:
+        for damping in DAMPINGS:
+            tracking = AxisTracking(stiffness, damping * stiffness**0.5, disturbance=disturbance)
+            loop = axis_loop(tracking, budget)
+            if loop is None:
+                continue
+            away, fast = loop.typical()
+            found = away + RATE_WEIGHT * fast + weight * float(loop.noises(1)[:, :, PULL].max())
+            if found < least:
+                best, least = loop, found
+    return best
+
+
+def axis_loop(tracking: AxisTracking, budget: Budget) -> AxisLoop | None:
+    """Return the loop with some gains, None where it is not stable for every error of the model."""
+    T = budget.period
+    periods = whole_periods(budget.delay, T), whole_periods(HORIZON, T)
+    gains, factors = (tracking.stiffness, tracking.damping), _factors(budget)
+    kicks = np.zeros((len(factors), 3, whole_periods(MEMORY, T)))
+    answers = np.zeros(kicks[:, 0].shape)
+    runs = zip(factors, kicks, answers, strict=True)
+    sums = np.array([_sums(gains, T, budget.lag, factor, periods, own, pull) for factor, own, pull in runs])
+    good = np.isfinite(sums).all() and (_rest(budget) * sums[:, PULL, PUSH] < 1.0).all()
+    return AxisLoop(tracking, budget, sums, kicks, answers) if good else None
+
+
+def _factors(budget: Budget) -> list[float]:
+    """Return f of every part of the model's range."""
+    parts = MODEL_PARTS if budget.model_error > 0.0 else 1
+    return [1.0 + budget.model_error * ((2 * part + 1) / parts - 1.0) for part in range(parts)]
+
+
+def _rest(budget: Budget) -> float:
+    """Return by how much the model's factor may differ from f within a part."""
+    return budget.model_error / (MODEL_PARTS if budget.model_error > 0.0 else 1)
+
+
+@compiled
+def _sums(
+    gains: tuple[float, float],
+    period: float,
+    lag: float,
+    factor: float,
+    periods: tuple[int, int],
+    kicks: FloatArray,
+    answers: FloatArray,
+) -> FloatArray:
+    """Return the sums of the magnitudes of responses, shape (3, 3), infinite where one does not end.
+
+    An acceleration w within a period acts on the sample after it by (T - t) on e and by 1 on e';
+    |h_e (T - t) + h_v| is convex in t, so that its chord is above it.
+
+    Args:
+        gains: K_a [1/s^2] and zeta_a [1/s].
+        period: T [s].
+        lag: Time constant of the actuators [s].
+        factor: f [-].
+        periods: Delay and ``HORIZON`` in periods.
+        kicks: Receives the responses to a unit of acceleration within ``MEMORY``, the oldest first, shape (3,
+            memory).
+        answers: Receives the pull that answers a unit of command, likewise, shape (memory,).
+    """
+    T, (delay, n), memory = period, periods, kicks.shape[1]
+    left, in_v, in_x = lag_factors(T, lag)
+    e, v, pull = np.zeros((3, n + 1)), np.zeros((3, n + 1)), np.zeros((3, n + 1))
+    e[1, 0], v[2, 0] = 1.0, 1.0  # the runs: a unit command, a unit of e and one of e'
+    q, sums, quiet = np.zeros(3), np.zeros((3, 3)), 0
+    for k in range(n):
+        largest = 0.0
+        for run in range(3):
+            if k >= delay:
+                pull[run, k] = -gains[0] * e[run, k - delay] - gains[1] * v[run, k - delay]
+            u = pull[run, k] + (1.0 if run == 0 and k == 0 else 0.0)
+            gap = q[run] - u
+            e[run, k + 1] = e[run, k] + T * v[run, k] + factor * (0.5 * T * T * u + in_x * gap)
+            v[run, k + 1] = v[run, k] + factor * (T * u + in_v * gap)
+            q[run] = u + left * gap
+            largest = max(largest, abs(e[run, k + 1]) + abs(v[run, k + 1]))
+        for i, h in enumerate((e, v, pull)):
+            sums[i, 0] += abs(h[0, k])
+            kick = 0.5 * T * (abs(h[1, k] * T + h[2, k]) + abs(h[2, k]))
+            sums[i, 1] += kick
+            if k >= memory:
+                sums[i, 2] += kick
+            else:
+                kicks[i, memory - 1 - k] = kick
+        if 0 < k <= memory:
+            answers[memory - k] = pull[0, k]
+        quiet = quiet + 1 if largest < LEFT else 0
+        if quiet > delay + 1:  # nothing that is measured later differs from this
+            return sums
+    return np.full((3, 3), np.inf)
+
+
+# How far the axes of a plan may depart from their nominal motions in one transition, period by period.
+#
+# The departure e = x - x^ of an axis is the sum of its loop's responses to what enters it, see
+# ``axis_departure.py``. In one period this is at most
+#
+# d = |epsilon| (|a^| + c(w^)) + c(w^ + e'_1) - c(w^) + w + (1 + epsilon - f) q,
+#
+# with the nominal rates w^ of all axes, and c the largest acceleration that rates alone cause where nothing
+# is commanded: robots command what balances it at the nominal rates, with masses that are wrong by epsilon.
+# e'_1 is what the first term and w alone cause, w being ``axis_error`` and what the friction of joints
+# causes: what noise adds is small and of any sign. All of this is known from the periods before, so that
+# one pass forward in time bounds the departures of all axes.
 
 ATTEMPTS = 30
 """Largest number of larger and larger bounds that are tried [-]."""
@@ -111,7 +342,7 @@ def departing(
     left = lag_factors(budget.period, budget.lag)[0]
     error = axis_errors(budget, loop.tracking, axes)
     scales = _Scales(budget.period, budget.model_error, error, loop.rest, left)
-    responses = loop.kicks, loop.sums[:, :, LATE].copy(), loop.noises(axes), loop.errors
+    responses = loop.kicks, loop.sums[:, :, OLD].copy(), loop.noises(axes), loop.errors
     _carry(responses, leaving, scales, coupling, moving, entered, state, found)
     highest = np.maximum.accumulate(entered[..., ::-1], axis=3)[..., ::-1]
     first = min(leaving, samples + 1)
@@ -305,3 +536,109 @@ def _settle(
         found[:, ever] = np.inf
     entered[:, :, :, memory + ever] = most
     state[2] = np.maximum(state[2], now[2])
+
+
+# The largest commands of all axes in a transition, of which a robot computes its efforts.
+#
+# A robot commands L + q, its law and the pull towards the nominal motion. Where its masses are too large by
+# epsilon, its efforts are those of (1 + epsilon) (L + q) by the true masses. The pull makes up for what is
+# too much: with f the middle of a part of the range of 1 + epsilon and h the response of the pull to a unit
+# of command in one period,
+#
+# L_k + q_k = L_k + (f - 1) / f * (sum over j < k of h(k - j) L_j) + noise + answers to all else,
+#
+# in which L is the same at every place. It lies in an interval that is known for every period, so that the
+# first two terms are added with their signs. What is left of the disturbances d of ``departing.py`` is d -
+# |f - 1| |a^|, of any sign.
+
+
+class CommandInflow(NamedTuple):
+    """What was commanded, and what else entered the loops, before a cell is entered.
+
+    Attributes:
+        past: Of the periods before, the latest last: largest |L|, then for every part of the model's range
+            the largest disturbance, shape (1 + parts, axes, memory) [rad/s^2 or m/s^2].
+        largest: The same of all times before, shape (1 + parts, axes).
+    """
+
+    past: FloatArray
+    largest: FloatArray
+
+
+def nothing_commanded(loop: AxisLoop, axes: int) -> CommandInflow:
+    """Return what was commanded before the start, where all axes rest."""
+    parts, memory = loop.answers.shape
+    past = np.zeros((1 + parts, axes, memory))
+    past[1:] = axis_errors(loop.budget, loop.tracking, axes)[:, None]
+    return CommandInflow(past, past[..., 0])
+
+
+def single_noise(loop: AxisLoop, axes: int) -> FloatArray:
+    """Return by how much the noise in one robot's command may exceed that in the mean's, (axes,) [rad/s^2].
+
+    All robots measure the object's angle, each its own joints.
+    """
+    tracking, budget, noise = loop.tracking, loop.budget, np.zeros(axes)
+    direct = tracking.stiffness * budget.angle_noise + tracking.damping * budget.rate_noise
+    noise[0] = (budget.single_noise - 1.0) * direct
+    return noise
+
+
+def largest_commands(
+    loop: AxisLoop,
+    laws: FloatArray,
+    nominal: FloatArray,
+    entered: FloatArray,
+    before: CommandInflow,
+    leaving: int,
+) -> tuple[FloatArray, CommandInflow]:
+    """Return the largest (1 + epsilon) |L + q| of every period, and what the next transition needs.
+
+    Args:
+        loop: The loop of all axes.
+        laws: Least and largest L of every period, the last for ever, shape (2, periods + 1, axes).
+        nominal: Largest |a^| of every period, likewise, shape (periods + 1, axes).
+        entered: d of every period and part of the model's range, shape (parts, axes, periods + 1).
+        before: What was commanded before this transition.
+        leaving: The first sample at which the cell can be left.
+
+    Returns:
+        Shape (periods + 1, axes), the last one for ever [rad/s^2 or m/s^2]; and what the next one needs.
+    """
+    memory = loop.answers.shape[1]
+    rest = entered - np.abs(np.array(loop.factors) - 1.0)[:, None, None] * nominal.T
+    sizes = np.concatenate([np.abs(laws).max(axis=0).T[None], rest])
+    sizes = np.concatenate([before.past, sizes], axis=2)
+    sizes[..., -1] = sizes[..., -1 - memory :].max(axis=2)
+    lower, upper = (
+        np.concatenate([sign * before.past[0], one.T], axis=1)
+        for sign, one in zip((-1.0, 1.0), laws, strict=True)
+    )
+    lower[:, -1], upper[:, -1] = -sizes[0, :, -1], sizes[0, :, -1]
+    largest = np.maximum(before.largest, sizes[..., memory:].max(axis=2))
+    noises = loop.noises(len(lower))[:, :, PULL].T + single_noise(loop, len(lower))
+    found = np.zeros(laws.shape[1:])
+    for p, factor in enumerate(loop.factors):
+        pull = (factor - 1.0) / factor * loop.answers[p]
+        up, down = np.maximum(pull, 0.0), np.minimum(pull, 0.0)
+        late = abs(factor - 1.0) / factor * (loop.sums[p, PULL, COMMANDED] - np.abs(loop.answers[p]).sum())
+        high = upper[:, memory:] + _answered(upper, up) + _answered(lower, down)
+        low = lower[:, memory:] + _answered(lower, up) + _answered(upper, down)
+        others = _answered(sizes[1 + p], loop.kicks[p, PULL])
+        old = late * largest[0] + loop.sums[p, PULL, OLD] * largest[1 + p]
+        command = np.maximum(high, -low) + others + (noises[p] + old)[:, None]
+        found = np.maximum(found, (factor + loop.rest) * command.T)
+    highest = np.maximum.accumulate(sizes[..., ::-1], axis=2)[..., ::-1]
+    first = min(leaving, laws.shape[1])
+    return found, CommandInflow(highest[..., first : first + memory].copy(), largest)
+
+
+def _answered(sizes: FloatArray, weights: FloatArray) -> FloatArray:
+    """Return weighted sums of the periods before each one, the last one for ever, (axes, periods + 1).
+
+    Args:
+        sizes: Of the periods before the transition, of its own, and for ever, (axes, memory + periods + 1).
+        weights: The oldest first, shape (memory,).
+    """
+    windows = np.lib.stride_tricks.sliding_window_view(sizes[:, :-1], len(weights), axis=1)
+    return np.concatenate([windows[:, :-1] @ weights, sizes[:, -1:] * weights.sum()], axis=1)

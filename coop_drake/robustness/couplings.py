@@ -1,17 +1,4 @@
-"""How strongly a team's masses couple its axes, bounded over all joints of a cell.
-
-Let J_b be the derivatives of a body's centre of mass by the axes (theta, q...), and H_b its second ones, seen
-from the object. Mass matrix, centripetal and Coriolis terms, and moments are sums over the bodies of products
-of these: sums of waves, see ``team_waves.py``.
-
-Accelerations x = M^-1 f for the right-hand sides f(q) follow without inverting M everywhere: with x_0 and
-its slopes x_l at the box's middle, M (x - x_0 - sum x_l d_l) = f_rest - M_rest x_0 - (M - M_0) sum x_l d_l,
-
-    |x| <= |x_0| + sum |x_l| r_l + (I - R)^-1 (|M_0^-1| (f_rest + M_rest |x_0|) + R sum |x_l| r_l),
-
-with R = sum |M_0^-1 M_l| r_l + |M_0^-1| M_rest, where R has a spectral radius below one. Boxes are halved
-until this is little more than what is found at their middles.
-"""
+"""How strongly a team's masses couple its axes, bounded over all joints of a cell."""
 
 from __future__ import annotations
 
@@ -23,7 +10,7 @@ import numpy as np
 
 from coop_drake.answers.budget import Budget
 from coop_drake.answers.plan import Cell
-from coop_drake.planning.budget.team_waves import (
+from coop_drake.robustness.waves import (
     NOTHING,
     Collector,
     TeamPoint,

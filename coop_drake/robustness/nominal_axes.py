@@ -1,34 +1,201 @@
-"""Where a nominal motion stays for ever once its funnel is closed.
-
-About rest in the middle of the closed funnel the law is a line plus a rest that is bounded by W while the
-axis departs by at most X and V. The departure is then the sum of what is left of the one at the time t0, and
-of the responses to all rests since: |x| <= transient + W sum |h_x|, and so for v. The tube says how far the
-axis departs from t0 until some time constants later, when the transient has vanished but for a small share.
-If the sum is at most X and V from then on, it stays so at every later sample by induction.
-"""
+"""All nominal motions of one axis that enter a cell from a set: where they can be until the next cell is entered."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import ceil
 from typing import NamedTuple
 
 import numpy as np
 
 from coop_drake.jit import compiled
 from coop_drake.laws.axis_table import (
+    ACCELERATION_LIMIT,
+    DECAY_RATE,
+    FADING_TIME,
     GOAL_LOWER,
     GOAL_UPPER,
+    LEAVING_TIME,
+    LIMIT_GAIN,
     POSITION_GAIN,
     RAMP_RATE,
     RATE_GAIN,
+    RATE_LIMIT,
+    REST_RATE,
+    REST_REACH,
     SATURATION,
     bounds_of,
-    slope_bounds,
+    track_row,
 )
-from coop_drake.laws.nominal import lag_factors
+from coop_drake.laws.funnels import CLOSING
+from coop_drake.laws.hand_over import fading
+from coop_drake.laws.nominal_axes import lag_factors
 from coop_drake.laws.ppc import ramped_gain
-from coop_drake.planning.budget.axis_tube import AxisConditions
-from coop_drake.planning.budget.law_fit import fit_law, law_memory
+from coop_drake.laws.slopes import slope_bounds
+from coop_drake.robustness.funnel_law import fit_law, law_memory
 from coop_drake.tree.pose import FloatArray
+
+# All nominal motions of one axis that enter a cell from a set: a tube around the motion from its middle.
+#
+# The sampled axis is linear but for its law: over a control period T the command u is held, and a first-
+# order lag lets the acceleration p follow it, so that the state (x, v, p) is carried over exactly. The law
+# is a line about the motion from the middle plus a bounded rest, see ``fit_law``. By superposition the
+# departure of the state is the sum of its responses to the departure at entry and to every sample's rest,
+# each bounded by the size of that times the magnitude of the response. The rest of a sample depends only on
+# departures before it, so that one pass forward in time bounds all of them.
+
+X, X_REACH, V, V_REACH, ACCELERATION, DISTANCE, COMMAND, COMMAND_REACH = range(8)
+COLUMNS = 8
+"""Columns of a tube, a row for every sample: x and the most that it may depart [rad or m], v and the most
+that it may depart [rad/s or m/s], the largest |acceleration| until the next sample, the least distance to the
+funnel's bounds until then, and the command and the most that it may depart [rad/s^2 or m/s^2]."""
+
+DIVERGED = 1e3
+"""A departure beyond this ends the pass [rad or m]."""
+
+
+class AxisConditions(NamedTuple):
+    """How the nominal motion of an axis is computed.
+
+    Attributes:
+        period: T [s].
+        lag: Time constant of the actuators [s].
+    """
+
+    period: float
+    lag: float
+
+
+LATE = 1
+"""Periods for which the command of the cell before acts after a switch [-]: all robots compute at the instant
+of the switch, before they hear of it."""
+
+
+@compiled
+def follow_tube(
+    row: FloatArray,
+    conditions: AxisConditions,
+    entry: tuple[float, float, float, float, float],
+    jump: float,
+    tube: FloatArray,
+) -> bool:
+    """Write the tube of an axis from its entry on, and return whether it keeps inside the funnel.
+
+    Args:
+        row: The axis, a row of an ``axis_table``.
+        conditions: How its motion is computed.
+        entry: x and v at the entry, the most that they may depart from these, and the largest |x''| and
+            command at the entry.
+        jump: What is added to the command and fades, see ``rest_jump``.
+        tube: Receives the tube, shape (samples, ``COLUMNS``).
+    """
+    T, n = conditions.period, tube.shape[0]
+    responses, weight = np.zeros((3, n + 3)), np.zeros(n + 3)
+    for i in range(3):  # to the departures of x, v and x'' at the entry, then to the disturbances of commands
+        responses[i, i], weight[i] = 1.0, entry[2 + i]
+    x, v, p, x_reach, v_reach, p_reach = entry[0], entry[1], 0.0, entry[2], entry[3], entry[4]
+    lagging, memory = lag_factors(T, conditions.lag), law_memory()
+    for k in range(n):
+        state = x, x_reach, v, v_reach
+        faded = fading(k * T, row[FADING_TIME]) * jump
+        u, slope, by_rate, weight[3 + k], most = _command(row, k * T, state, faded, memory)
+        if k < LATE:  # all of the command, the old one or the new one, counts as a disturbance
+            most = max(most, entry[4])
+            u, slope, by_rate, weight[3 + k] = 0.0, 0.0, 0.0, most
+        tube[k, COMMAND], tube[k, COMMAND_REACH] = u, most - abs(u)
+        _note(tube[k], row, k * T, T, state, max(abs(p) + p_reach, most))
+        if not tube[k, DISTANCE] > 0.0 or not x_reach < DIVERGED:
+            return False
+        gap = p - u
+        x, v = x + T * v + 0.5 * T * T * u + lagging[2] * gap, v + T * u + lagging[1] * gap
+        p = u + lagging[0] * gap
+        x_reach, v_reach, p_reach = _respond(responses, weight, k, (T, slope, by_rate), lagging)
+    return True
+
+
+@compiled(borrows=True)
+def _command(
+    row: FloatArray, time: float, state: tuple[float, float, float, float], faded: float, memory: FloatArray
+) -> tuple[float, float, float, float, float]:
+    """Return the undisturbed command, its two slopes, the size of its disturbance and its largest magnitude.
+
+    Args:
+        row: The axis.
+        time: Time since the cell was entered [s].
+        state: x of the undisturbed motion, the most that it may depart, and so for v.
+        faded: What is left of the jump of the command at the switch.
+        memory: For ``fit_law``.
+    """
+    x, reach, v, fast = state
+    u = track_row(row, time, x, v)[0] + faded
+    slope, by_rate, rest, spread = fit_law(row, time, x, reach, v, memory)
+    rest += spread * fast
+    return u, slope, by_rate, rest, abs(u) + abs(slope) * reach + abs(by_rate) * fast + rest
+
+
+@compiled(borrows=True)
+def _note(
+    sample: FloatArray,
+    row: FloatArray,
+    time: float,
+    period: float,
+    state: tuple[float, float, float, float],
+    fastest: float,
+) -> None:
+    """Write one row of a tube but its command.
+
+    Between two samples a motion departs from its chord by at most T^2 / 8 times its acceleration, and so does
+    a bound of the funnel.
+    """
+    lower, upper, _, _, bend, other = bounds_of(row, time)
+    _, _, _, _, next_bend, next_other = bounds_of(row, time + period)
+    bent = max(max(abs(bend), abs(other)), max(abs(next_bend), abs(next_other)))
+    sample[X], sample[X_REACH], sample[V], sample[V_REACH] = state
+    sample[ACCELERATION] = fastest
+    nearest = min(state[0] - state[1] - lower, upper - state[0] - state[1])
+    sample[DISTANCE] = nearest - 0.125 * period * period * (fastest + bent)
+
+
+@compiled(reassociate=True, borrows=True)
+def _respond(
+    responses: FloatArray,
+    weight: FloatArray,
+    k: int,
+    law: tuple[float, float, float],
+    lagging: tuple[float, float, float],
+) -> tuple[float, float, float]:
+    """Carry all responses over a period; return the sums of their magnitudes times what they respond to.
+
+    The loop has no branches and goes through memory in order, so that vector units are used.
+    """
+    T, slope, by_rate = law
+    left, in_v, in_x = lagging
+    x, v, p, last = responses[0], responses[1], responses[2], 3 + k
+    x_sum = v_sum = p_sum = 0.0
+    for j in range(last):
+        u = slope * x[j] + by_rate * v[j]
+        gap = p[j] - u
+        x[j] = x[j] + T * v[j] + 0.5 * T * T * u + in_x * gap
+        v[j] = v[j] + T * u + in_v * gap
+        p[j] = u + left * gap
+        x_sum += abs(x[j]) * weight[j]
+        v_sum += abs(v[j]) * weight[j]
+        p_sum += abs(p[j]) * weight[j]
+    x[last], v[last], p[last] = 0.5 * T * T - in_x, T - in_v, 1.0 - left
+    x_sum += abs(x[last]) * weight[last]
+    v_sum += abs(v[last]) * weight[last]
+    p_sum += abs(p[last]) * weight[last]
+    return x_sum, v_sum, p_sum
+
+
+# Where a nominal motion stays for ever once its funnel is closed.
+#
+# About rest in the middle of the closed funnel the law is a line plus a rest that is bounded by W while the
+# axis departs by at most X and V. The departure is then the sum of what is left of the one at the time t0,
+# and of the responses to all rests since: |x| <= transient + W sum |h_x|, and so for v. The tube says how
+# far the axis departs from t0 until some time constants later, when the transient has vanished but for a
+# small share. If the sum is at most X and V from then on, it stays so at every later sample by induction.
 
 TIME_CONSTANTS = 5.0
 """Length of the responses over their slowest time constant [-]: less than a hundredth of them is left, and
@@ -92,7 +259,7 @@ def settle(
             break
         slope, by_rate, size, most = _line(row, time, x, v)
         fastest = max(most, entry[2])
-        sums = _sums(conditions, slope, by_rate, entry, samples)
+        sums = _response_sums(conditions, slope, by_rate, entry, samples)
         x_next, v_next = sums[0, 0] + sums[1, 0] * size, sums[0, 1] + sums[1, 1] * size
         if SPARE * x_next <= x and SPARE * v_next <= v:
             return Settled(half - x - 0.125 * T * T * fastest, fastest, x, v)
@@ -124,7 +291,7 @@ def _line(row: FloatArray, time: float, x: float, v: float) -> tuple[float, floa
 
 
 @compiled
-def _sums(
+def _response_sums(
     conditions: AxisConditions,
     slope: float,
     by_rate: float,
@@ -179,3 +346,296 @@ def _sums(
         for i in range(2):
             result[0, i], result[1, i] = kept * reached[i], sums[i, 3] / (1.0 - share)
     return result
+
+
+# The sets of one axis in one transition, and the set in which it can enter the next one.
+
+RAMPED = 6.0
+"""mu t after which the gain k1 counts as ramped in [-]: a sixtieth of it is missing then."""
+
+
+@dataclass(frozen=True)
+class Entry:
+    """The set of states in which an axis enters a transition.
+
+    Attributes:
+        lower: Lowest position [rad or m].
+        upper: Highest position [rad or m].
+        rate_lower: Lowest rate [rad/s or m/s].
+        rate_upper: Highest rate [rad/s or m/s].
+        acceleration: Largest magnitude of acceleration and command at the entry [rad/s^2 or m/s^2].
+        rest: Position at which the last cell is left at rest, for which ``rest_jump`` is computed [rad
+            or m]; the middle of the positions if not given.
+    """
+
+    lower: float
+    upper: float
+    rate_lower: float = 0.0
+    rate_upper: float = 0.0
+    acceleration: float = 0.0
+    rest: float | None = None
+
+
+@dataclass(frozen=True)
+class AxisSets:
+    """What follows for one axis in one transition.
+
+    Attributes:
+        tubes: Of every part of the entry set, shape (samples, ``COLUMNS``).
+        distance: Least distance to the funnel's bounds at all times [rad or m]; not positive if none is
+            shown.
+        acceleration: Largest magnitude of the acceleration [rad/s^2 or m/s^2].
+        last: Largest magnitude of the acceleration once the funnel is closed [rad/s^2 or m/s^2].
+        settled: Largest departure from the goal interval's middle once the funnel is closed [rad or m].
+        settled_rate: Largest rate once the funnel is closed [rad/s or m/s].
+        parts: Into how many parts the positions at the entry were cut.
+        settled_distance: As ``distance``, once the funnel is closed.
+    """
+
+    tubes: tuple[FloatArray, ...]
+    distance: float
+    acceleration: float = np.inf
+    last: float = np.inf
+    settled: float = np.inf
+    settled_rate: float = np.inf
+    parts: int = 1
+    settled_distance: float = 0.0
+
+    def spare(self, departures: FloatArray) -> float:
+        """Return the least distance to the funnel's bounds of an axis that departs [rad or m].
+
+        Args:
+            departures: Its largest departures in all periods, the last one for ever, shape (periods + 1,).
+        """
+        distances = [tube[:, DISTANCE] - departures[: len(tube)] for tube in self.tubes]
+        least = min(float(some.min()) for some in distances)
+        ended = min(len(tube) for tube in self.tubes)
+        return min(least, self.settled_distance - float(departures[ended:].max()))
+
+    def moving(self, samples: int, period: float) -> FloatArray:
+        """Return the largest |x''| and |x'| in all periods, the last one for ever, shape (2, samples + 1)."""
+        moving = np.repeat([[self.last], [self.settled_rate]], samples + 1, axis=1)
+        for tube in self.tubes:
+            now = np.array([tube[:, ACCELERATION], np.abs(tube[:, V]) + tube[:, V_REACH]])
+            moving[:, : len(tube)] = np.maximum(moving[:, : len(tube)], now)
+        moving[1] += period * moving[0]
+        return moving
+
+    def commands(self, samples: int) -> FloatArray:
+        """Return the least and the largest command of every period, the last for ever, (2, samples + 1)."""
+        bounds = np.repeat([[np.inf], [-np.inf]], samples + 1, axis=1)
+        for tube in self.tubes:
+            n, middle, reach = len(tube), tube[:, COMMAND], tube[:, COMMAND_REACH]
+            bounds[0, :n] = np.minimum(bounds[0, :n], middle - reach)
+            bounds[1, :n] = np.maximum(bounds[1, :n], middle + reach)
+            bounds[0, n:] = np.minimum(bounds[0, n:], -self.last)
+            bounds[1, n:] = np.maximum(bounds[1, n:], self.last)
+        return bounds
+
+    def fastest(self, departures: FloatArray, period: float) -> float:
+        """Return the largest rate of an axis whose rate departs by these, as for ``spare`` [rad/s or m/s]."""
+        return float((self.moving(len(departures) - 1, period)[1] + departures).max())
+
+
+def axis_sets(row: FloatArray, conditions: AxisConditions, entry: Entry, parts: int) -> AxisSets:
+    """Bound a nominal motion from its entry on for all times.
+
+    Args:
+        row: The axis, a row of an ``axis_table``, with a quintic funnel.
+        conditions: How the motion is computed.
+        entry: The set in which it enters.
+        parts: Into how many parts the positions at the entry are cut, each with a tube of its own.
+    """
+    T, middle = conditions.period, 0.5 * (row[GOAL_LOWER] + row[GOAL_UPPER])
+    closed = max(CLOSING / row[DECAY_RATE], RAMPED / row[RAMP_RATE] if row[RAMP_RATE] > 0.0 else 0.0)
+    begin, tail = ceil(max(closed, row[FADING_TIME]) / T), tail_samples(row, conditions)
+    tubes = _tubes(row, conditions, entry, parts, begin + tail + 1)
+    if not tubes:
+        return AxisSets((), 0.0)
+    ends = np.array([_closed_part(tube[begin:], middle) for tube in tubes]).max(axis=0).tolist()
+    kept = settle(row, conditions, begin * T, (ends[0], ends[1], ends[2]), (ends[3], ends[4]), tail)
+    most = max(kept.acceleration, *(float(tube[:, ACCELERATION].max()) for tube in tubes))
+    return AxisSets(
+        tuple(tubes),
+        min(kept.distance, *(float(tube[:, DISTANCE].min()) for tube in tubes)),
+        most,
+        kept.acceleration,
+        kept.x,
+        kept.rate,
+        parts,
+        kept.distance,
+    )
+
+
+@compiled(borrows=True)
+def _closed_part(tube: FloatArray, middle: float) -> tuple[float, float, float, float, float]:
+    """Return |x - middle|, |v| and |x''| of the first sample, and the largest of the first two of all."""
+    x = v = 0.0
+    for k in range(len(tube)):
+        x = max(x, abs(tube[k, X] - middle) + tube[k, X_REACH])
+        v = max(v, abs(tube[k, V]) + tube[k, V_REACH])
+    first = tube[0]
+    return abs(first[X] - middle) + first[X_REACH], abs(first[V]) + first[V_REACH], first[ACCELERATION], x, v
+
+
+def _tubes(
+    row: FloatArray, conditions: AxisConditions, entry: Entry, parts: int, samples: int
+) -> list[FloatArray]:
+    """Return the tubes of all parts of the positions at the entry, none if one leaves the funnel."""
+    half = 0.5 * (entry.upper - entry.lower) / parts
+    fast, reach = 0.5 * (entry.rate_lower + entry.rate_upper), 0.5 * (entry.rate_upper - entry.rate_lower)
+    rest = 0.5 * (entry.lower + entry.upper) if entry.rest is None else entry.rest
+    tubes, jump = [], -track_row(row, 0.0, rest, 0.0)[0]
+    for i in range(parts):
+        tube = np.zeros((samples, COLUMNS))
+        middle = float(entry.lower + (2 * i + 1) * half)
+        start = middle, fast, float(half), reach, entry.acceleration
+        if not follow_tube(row, conditions, start, jump, tube):
+            return []
+        tubes.append(tube)
+    return tubes
+
+
+# Whether limits of rate or acceleration may act on an axis under a budget.
+
+
+def comes_near_limit(row: FloatArray, sets: AxisSets) -> bool:
+    """Return whether a x' <= g (L^2 - x'^2) / 2 or |a| <= A may fail for a nominal motion.
+
+    Sets are those of the law without limits; they hold with these where none acts at any time.
+
+    Args:
+        row: The axis, a row of an ``axis_table``.
+        sets: Its sets.
+    """
+    limit = row[RATE_LIMIT]
+    if not min(limit, row[ACCELERATION_LIMIT]) < np.inf:
+        return False
+    rates = np.concatenate(
+        [[sets.settled_rate], *(np.abs(tube[:, V]) + tube[:, V_REACH] for tube in sets.tubes)]
+    )
+    accelerations = np.concatenate([[sets.last], *(tube[:, ACCELERATION] for tube in sets.tubes)])
+    if (accelerations > row[ACCELERATION_LIMIT]).any():
+        return True
+    if not limit < np.inf:
+        return False
+    return bool((rates * accelerations > 0.5 * row[LIMIT_GAIN] * (limit * limit - rates * rates)).any())
+
+
+# When an axis may leave its cell, and the set of states in which it can enter the next one.
+
+EARLIER = 4
+"""By how many samples earlier a cell may be left than the tubes say: another approximation of the law gives
+tubes that come to rest up to 2 samples earlier."""
+
+LOWEST, HIGHEST = [0, 2], [1, 3, 4, 5]
+"""Which of the numbers of an entry set are lower bounds, and which upper ones."""
+
+
+def next_entry(row: FloatArray, sets: AxisSets, conditions: AxisConditions, report_periods: int) -> Entry:
+    """Return the set in which an axis can enter the next cell.
+
+    Its motion was at rest when a report was made; since then the time for which reports may be used has
+    passed, and a period. In that time it went no farther than its largest acceleration allows, and it has
+    stayed in its tube.
+
+    Args:
+        row: The axis in this cell, with the condition of rest under which the cell is left.
+        sets: Its sets.
+        conditions: How its motion is computed.
+        report_periods: How long a report may be used, in periods.
+    """
+    middle = 0.5 * (row[GOAL_LOWER] + row[GOAL_UPPER])
+    rest, since = (float(row[REST_REACH]), float(row[REST_RATE])), report_periods + 1
+    time = since * conditions.period
+    before = max(sets.last, *(float(tube[-1 - since :, ACCELERATION].max()) for tube in sets.tubes))
+    x, v = sets.settled, sets.settled_rate
+    bounds = np.array([middle - x, middle + x, -v, v, sets.last, before])
+    _limit(bounds, middle, rest, time)
+    leaving = ceil(row[LEAVING_TIME] / conditions.period - 1e-6)
+    for tube in sets.tubes:
+        found = _switching(tube, middle, rest, (since, leaving))
+        if found[0] <= found[1]:
+            _limit(found, middle, rest, time)
+            bounds[LOWEST] = np.minimum(bounds[LOWEST], found[LOWEST])
+            bounds[HIGHEST] = np.maximum(bounds[HIGHEST], found[HIGHEST])
+    low, high, slow, quick, pushed = bounds[:5].tolist()
+    return Entry(low, high, slow, quick, pushed, middle)
+
+
+def first_leaving(table: FloatArray, every: Sequence[AxisSets], period: float) -> int:
+    """Return the first sample at which all axes of a transition can have come to rest and its cell be left.
+
+    Args:
+        table: The axes, with the condition of rest under which the cell is left.
+        every: Their sets.
+        period: T [s].
+    """
+    stay: int = ceil(table[0, LEAVING_TIME] / period - 1e-6)
+    first = stay
+    for row, sets in zip(table, every, strict=True):
+        middle, rest = (
+            0.5 * (row[GOAL_LOWER] + row[GOAL_UPPER]),
+            (float(row[REST_REACH]), float(row[REST_RATE])),
+        )
+        first = max(first, min(_first_rest(tube, middle, rest, stay) for tube in sets.tubes))
+    return max(stay, first - EARLIER)
+
+
+@compiled(borrows=True)
+def _rests(sample: FloatArray, middle: float, rest: tuple[float, float]) -> bool:
+    """Return whether a motion can be at rest at a sample of a tube."""
+    near = abs(sample[X] - middle) <= rest[0] + sample[X_REACH]
+    return bool(near and abs(sample[V]) <= rest[1] + sample[V_REACH])
+
+
+@compiled(borrows=True)
+def _first_rest(tube: FloatArray, middle: float, rest: tuple[float, float], first: int) -> int:
+    """Return the first sample of a tube from another one on at which a motion can be at rest, or its end."""
+    for k in range(first, len(tube)):
+        if _rests(tube[k], middle, rest):
+            return k
+    return max(first, len(tube))
+
+
+@compiled(borrows=True)
+def _limit(bounds: FloatArray, middle: float, rest: tuple[float, float], time: float) -> None:
+    """Cut bounds of states to where a motion can be that was at rest some time ago."""
+    farther = rest[0] + time * (rest[1] + 0.5 * time * bounds[5])
+    faster = rest[1] + time * bounds[5]
+    bounds[0], bounds[1] = max(bounds[0], middle - farther), min(bounds[1], middle + farther)
+    bounds[2], bounds[3] = max(bounds[2], -faster), min(bounds[3], faster)
+
+
+@compiled
+def _switching(
+    tube: FloatArray, middle: float, rest: tuple[float, float], samples: tuple[int, int]
+) -> FloatArray:
+    """Return bounds of x and v, the largest |x''|, and that since the report, when a tube can be left.
+
+    The lowest x is above the highest one if it cannot be left before its end.
+
+    Args:
+        tube: The tube.
+        middle: Where the axis rests [rad or m].
+        rest: Distance and rate within which the axis counts as at rest [rad or m, rad/s or m/s].
+        samples: For how many samples a report may be used, and the first sample of a report.
+
+    Returns:
+        Shape (6,): lowest and highest x, lowest and highest v, the two accelerations.
+    """
+    since, leaving = samples
+    found = np.array([np.inf, -np.inf, np.inf, -np.inf, 0.0, 0.0])
+    reported = -since - 1
+    for k in range(leaving, len(tube)):
+        x, x_reach, v, v_reach = tube[k, X] - middle, tube[k, X_REACH], tube[k, V], tube[k, V_REACH]
+        if _rests(tube[k], middle, rest):
+            reported = k
+        if k - reported > since:
+            continue
+        found[0], found[1] = min(found[0], middle + x - x_reach), max(found[1], middle + x + x_reach)
+        found[2], found[3] = min(found[2], v - v_reach), max(found[3], v + v_reach)
+        found[4] = max(found[4], tube[k, ACCELERATION])
+        for i in range(max(k - since, leaving), k + 1):
+            found[5] = max(found[5], tube[i, ACCELERATION])
+    return found

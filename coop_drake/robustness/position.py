@@ -1,22 +1,4 @@
-"""How far the object's origin may depart from its nominal motion under a budget.
-
-Let e be one coordinate of p less its nominal value. The nominal motion obeys p^'' = -K (p^ - p_G) - zeta p^'
-with p_G at rest between samples. Robots command, at sample k and with measurements that are m periods old,
-
-    u_k = p^''_k - K_t (e_(k-m) + n_p) - zeta_t (e'_(k-m) + n_v),
-
-which is held for a period T, and the acceleration s follows with s' = (u - s) / lag. The object accelerates
-by p'' = (1 + epsilon) s + w. This loop is linear and does not vary in time. Its response at sample k to
-inputs at earlier samples j is a sum of h(k - j) times the inputs, so that the largest response to inputs of
-bounded size is the sum of all |h| times their bound, for vectors in the plane, too, because both coordinates
-have the same h. Inputs are what noise adds to a command, the accelerations w, and the steps of p_G, each of
-at most T times its largest speed.
-
-Where the age of measurements may be wrong by s, a robot compares what was measured with the nominal state of
-another instant, by at most s away. So n_p is larger by s times the largest |p'|, and n_v by s times the
-largest |p''|, both of the object and not of its nominal motion alone: a longer or shorter delay of the loop
-is in it.
-"""
+"""How far the object's origin may depart from its nominal motion under a budget."""
 
 from __future__ import annotations
 
@@ -30,8 +12,8 @@ from scipy.linalg import expm
 
 from coop_drake.answers.budget import Budget, PositionTube
 from coop_drake.jit import compiled
-from coop_drake.laws.measurements import whole_periods
-from coop_drake.planning.budget.alarms import unseen_of
+from coop_drake.laws.sampling import whole_periods
+from coop_drake.robustness.alarms import unseen_of
 from coop_drake.tree.pose import FloatArray
 
 MODEL_PARTS = 10

@@ -1,16 +1,4 @@
-"""Functions of a team's joints as sums of waves, exact in values and slopes.
-
-A link that turns by q carries all that lies beyond it by exp(i q). Positions of points, as complex numbers
-seen from the object, their derivatives by the axes (theta, q...), and products of these are sums of waves,
-
-    f(q) = sum of size * q^slides * cos(turns . q + phase).
-
-In a box about q_0 with the half-widths r, the rest of size p cos(u) beyond its slopes is at most
-
-    size (p_0 (|turns| . r)^2 / 2 + g |turns| . r + p_1 - p_0 - g)
-
-with p_0 = |q_0|^slides, p_1 = (|q_0| + r)^slides, and g the first-order part of their difference.
-"""
+"""Functions of a team's joints as sums of waves, exact in values and slopes."""
 
 from __future__ import annotations
 

@@ -6,12 +6,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from coop_drake.answers.budget import Budget
-from coop_drake.laws.nominal import lag_factors
-from coop_drake.planning.budget.axis_departure import best_loop
-from coop_drake.planning.budget.axis_sets import AxisSets
-from coop_drake.planning.budget.axis_tube import ACCELERATION, COLUMNS, COMMAND, COMMAND_REACH
-from coop_drake.planning.budget.commands import largest_commands, nothing_commanded
-from coop_drake.planning.budget.departing import at_rest, departing
+from coop_drake.laws.nominal_axes import lag_factors
+from coop_drake.robustness.axis_departure import (
+    at_rest,
+    best_loop,
+    departing,
+    largest_commands,
+    nothing_commanded,
+)
+from coop_drake.robustness.nominal_axes import ACCELERATION, COLUMNS, COMMAND, COMMAND_REACH, AxisSets
 from coop_drake.verification.budgets import efforts
 from coop_drake.verification.budgets.axis_departure import departures, loop_of, resting
 

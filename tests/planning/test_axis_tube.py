@@ -7,11 +7,19 @@ import pytest
 
 from coop_drake.laws import Funnel, ScheduledGains, transition_gains
 from coop_drake.laws.axis_table import FADING_TIME, axis_table, bounds_of, track_row
-from coop_drake.laws.nominal import carry_axes
-from coop_drake.laws.ppc import fading
-from coop_drake.planning.budget.axis_sets import Entry, axis_sets
-from coop_drake.planning.budget.axis_tube import DISTANCE, V_REACH, X_REACH, AxisConditions, V, X
-from coop_drake.planning.budget.law_fit import fit_law, law_memory
+from coop_drake.laws.hand_over import fading
+from coop_drake.laws.nominal_axes import carry_axes
+from coop_drake.robustness.funnel_law import fit_law, law_memory
+from coop_drake.robustness.nominal_axes import (
+    DISTANCE,
+    V_REACH,
+    X_REACH,
+    AxisConditions,
+    Entry,
+    V,
+    X,
+    axis_sets,
+)
 
 
 def axis(age=0.0175, slice_=(-0.1, 0.25), goal=(0.0, 0.12), resting=0.02):

@@ -13,11 +13,11 @@ from coop_drake.answers import Plan
 from coop_drake.answers.budget import Budget
 from coop_drake.laws import ScheduledGains
 from coop_drake.laws.nominal import nominal_flow
-from coop_drake.planning.budget.alarms import alarms_of, position_room, unseen_of
 from coop_drake.planning.budget.position_fit import UnprovedPosition, commanded_accelerations, fit_position
-from coop_drake.planning.budget.position_tube import PositionGains, position_tubes
 from coop_drake.planning.transitions import with_gains
 from coop_drake.plant import planning_problem
+from coop_drake.robustness.alarms import alarms_of, position_room, unseen_of
+from coop_drake.robustness.position import PositionGains, position_tubes
 from tests.support.small_loop import small_problem
 from tests.support.tubes import BUDGET, tubed_problem
 

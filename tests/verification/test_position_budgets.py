@@ -10,7 +10,7 @@ from coop_drake.answers import load_plan, save_plan
 from coop_drake.answers.budget import LIMITS, Budget
 from coop_drake.errors import RefusalError
 from coop_drake.laws.nominal import nominal_flow
-from coop_drake.planning.budget.position_tube import SLACK, PositionGains, position_tubes
+from coop_drake.robustness.position import SLACK, PositionGains, position_tubes
 from coop_drake.typed_data import DataError
 from coop_drake.verification.budgets import check_budget, check_position
 from coop_drake.verification.budgets.position_loop import oscillator, position_bounds

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -11,26 +12,300 @@ from coop_drake.answers.budget import AxisTracking, Budget, Tolerance
 from coop_drake.answers.plan import Plan, Transition
 from coop_drake.answers.problem import PlanningProblem
 from coop_drake.laws import ScheduledGains
-from coop_drake.laws.axis_table import LEAVING_TIME, REST_RATE, REST_REACH, axis_table
+from coop_drake.laws.axis_table import (
+    ACCELERATION_LIMIT,
+    GOAL_LOWER,
+    GOAL_UPPER,
+    LEAVING_TIME,
+    RATE_LIMIT,
+    REST_RATE,
+    REST_REACH,
+    axis_table,
+)
 from coop_drake.laws.gains import IDEAL_AGE, RestCondition
-from coop_drake.planning.budget.alarms import axis_noises
-from coop_drake.planning.budget.axis_departure import SLACK, AxisLoop, axis_loop, best_loop
-from coop_drake.planning.budget.coupling import (
+from coop_drake.laws.readiness import EROSION
+from coop_drake.laws.sampling import whole_periods
+from coop_drake.planning.budget.restarting import reached_at_restart, with_restart
+from coop_drake.planning.transitions import share_speeds, with_gains
+from coop_drake.robustness.alarms import axis_noises, least_distance
+from coop_drake.robustness.axis_departure import (
+    SLACK,
+    AxisLoop,
+    CommandInflow,
+    Departures,
+    Inflow,
+    at_rest,
+    axis_loop,
+    best_loop,
+    departing,
+    largest_commands,
+    nothing_commanded,
+)
+from coop_drake.robustness.couplings import (
+    QUICKEST,
     Couplings,
     Efforts,
     TeamCouplings,
     friction_pushes,
     team_couplings,
 )
-from coop_drake.planning.budget.restarting import reached_at_restart, with_restart
-from coop_drake.planning.budget.transitions import (
-    LimitedEfforts,
-    ProvedTransition,
-    UnprovedTransition,
-    follow_transitions,
+from coop_drake.robustness.nominal_axes import (
+    AxisConditions,
+    AxisSets,
+    Entry,
+    axis_sets,
+    comes_near_limit,
+    first_leaving,
+    next_entry,
 )
-from coop_drake.planning.transitions import share_speeds, with_gains
 from coop_drake.tree.pose import FloatArray
+
+# All axes from transition to transition: from one entry set of a nominal motion follows the next one.
+
+REST_SHARE = 0.05
+"""Largest distance from the middle of a goal interval with which a nominal motion may leave a cell, over the
+interval's width [-]: the less, the smaller is the entry set of the next cell, and the longer it takes."""
+
+REST_SPEED = 0.03
+"""Largest rate with which a nominal motion may leave a cell [rad/s or m/s]."""
+
+REST_FACTOR = 1.5
+"""Least distance and rate with which a cell may be left, over the largest ones of a settled motion [-]."""
+
+ATTEMPTS = 12
+"""Largest number of attempts to get beyond a transition, with other gains of it or of those before it [-]."""
+
+OTHERWISE = 0.01
+"""Fraction by which departures are enlarged [-]: another approximation of the law gives other tubes, and up
+to 0.3 % larger departures."""
+
+ENTRY_PARTS = (1, 3)
+"""Parts into which the positions at an entry are cut, tried in this order [-]."""
+
+
+class LimitedEfforts(NamedTuple):
+    """What limits efforts.
+
+    Attributes:
+        efforts: What efforts accelerations take in every cell.
+        acceleration: Largest acceleration that a robot commands for the object's origin, by the true masses,
+            see ``PositionTube`` [m/s^2].
+    """
+
+    efforts: Efforts
+    acceleration: float
+
+
+@dataclass(frozen=True)
+class UnprovedTransition:
+    """The first transition for which a budget cannot be shown to hold.
+
+    Attributes:
+        transition: Index of the transition.
+        axis: Index of the axis, theta being 0; None where the reason names an effort.
+        reason: What cannot be shown, in words.
+    """
+
+    transition: int
+    axis: int | None
+    reason: str
+
+
+@dataclass(frozen=True)
+class ProvedTransition:
+    """One transition for which a budget holds.
+
+    Attributes:
+        table: Its axes, an ``axis_table`` with the condition of rest under which the cell is left.
+        entries: The sets in which their nominal motions enter.
+        sets: What follows for these.
+        spare: Least distances of the axes to their funnels' bounds, shape (axes,) [rad or m].
+        departure: Largest departures from them, shape (axes,) [rad or m].
+        rate_departure: Largest departures of the rates, shape (axes,) [rad/s or m/s].
+        reached: Largest rates and accelerations of the axes, departures included, shape (2, axes).
+        effort: Largest efforts, as a ``Tolerance`` states them.
+        inflow: What has entered the loops of its axes when the next one begins.
+        commanded: What has been commanded then; None where nothing limits efforts.
+        choice: Number of the gains that it has.
+    """
+
+    table: FloatArray
+    entries: Sequence[Entry]
+    sets: Sequence[AxisSets]
+    spare: FloatArray
+    departure: FloatArray
+    rate_departure: FloatArray
+    reached: FloatArray
+    effort: FloatArray
+    inflow: Inflow
+    commanded: CommandInflow | None = None
+    choice: int = 0
+
+
+def follow_transitions(
+    table_of: Callable[[int, int], FloatArray],
+    choices: int,
+    couplings: FloatArray,
+    start: FloatArray,
+    loop: AxisLoop,
+    limited: LimitedEfforts | None = None,
+) -> list[ProvedTransition] | UnprovedTransition:
+    """Follow all axes through transitions: their nominal motions, and how far they depart from these.
+
+    Every transition has the first gains with which it holds, and with which the next one does.
+
+    Args:
+        table_of: Returns the axes in transition k with a choice of gains, an ``axis_table`` with quintic
+            funnels.
+        choices: How many choices of gains there are, the quickest first.
+        couplings: How much rates accelerate the axes in every cell, see ``cell_couplings``.
+        start: Where they rest at the beginning, shape (axes,) [rad or m].
+        loop: The loop that pulls the axes to their nominal motions, with the budget.
+        limited: What limits efforts, None where nothing does.
+    """
+    proved, choice, furthest, failed = list[ProvedTransition](), 0, -1, 0
+    limit = UnprovedTransition(0, 0, "")
+    while (k := len(proved)) < len(couplings):
+        found = _attempt(
+            k, table_of(choice, k).copy(), couplings[k], proved[-1] if proved else start, loop, limited
+        )
+        if not isinstance(found, UnprovedTransition):
+            proved.append(replace(found, choice=choice))
+            choice = 0
+            continue
+        if k > furthest:
+            furthest, failed, limit = k, 0, found
+        choice, failed = choice + 1, failed + 1
+        while choice == choices or failed == ATTEMPTS:
+            if failed == ATTEMPTS or not proved:
+                return limit
+            choice = proved.pop().choice + 1
+    return proved
+
+
+def _attempt(
+    k: int,
+    table: FloatArray,
+    coupling: FloatArray,
+    before: ProvedTransition | FloatArray,
+    loop: AxisLoop,
+    limited: LimitedEfforts | None,
+) -> ProvedTransition | UnprovedTransition:
+    """Return what holds for transition k, entered from the one before or from rest; or what does not hold."""
+    budget, T = loop.budget, loop.budget.period
+    conditions = AxisConditions(T, budget.lag)
+    if isinstance(before, ProvedTransition):
+        entries, inflow = _entries(before, conditions, whole_periods(budget.report_age, T)), before.inflow
+    else:
+        entries, inflow = [Entry(float(x), float(x)) for x in before], at_rest(loop, len(before))
+    every = _sets(k, table, entries, conditions)
+    if isinstance(every, UnprovedTransition):
+        return every
+    leaving = first_leaving(table, every, T)
+    found, inflow = departing(loop, every, coupling, inflow, leaving)
+    found = Departures(*((1.0 + OTHERWISE) * one for one in found))
+    departure, rate_departure, push = (one.max(axis=0) for one in found[:3])
+    spare = np.array([(1.0 - SLACK) * sets.spare(found.position[:, i]) for i, sets in enumerate(every)])
+    needed = least_distance(budget, loop.tracking, len(every))
+    reached = np.empty((2, len(every)))
+    for axis, sets in enumerate(every):
+        if not spare[axis] > 0.0:
+            return UnprovedTransition(k, axis, "may leave its funnel")
+        if not spare[axis] > needed[axis]:
+            return UnprovedTransition(k, axis, "may leave its funnel before its monitor sees it")
+        reached[0, axis] = (1.0 + SLACK) * sets.fastest(found.rate[:, axis], T)
+        reached[1, axis] = (1.0 + SLACK) * sets.acceleration + push[axis]
+        if not reached[0, axis] < table[axis, RATE_LIMIT]:
+            return UnprovedTransition(k, axis, "may exceed the limit of its rate")
+        if not reached[1, axis] <= table[axis, ACCELERATION_LIMIT]:
+            return UnprovedTransition(k, axis, "may exceed the limit of its acceleration")
+    effort, commanded = np.zeros(0), None
+    if limited is not None:
+        commanded = before.commanded if isinstance(before, ProvedTransition) else None
+        commanded = commanded or nothing_commanded(loop, len(every))
+        asked = _effort(k, limited, every, found, loop, commanded, leaving)
+        if isinstance(asked, UnprovedTransition):
+            return asked
+        effort, commanded = asked
+    return ProvedTransition(
+        table, entries, every, spare, departure, rate_departure, reached, effort, inflow, commanded
+    )
+
+
+def _effort(
+    k: int,
+    limited: LimitedEfforts,
+    every: Sequence[AxisSets],
+    found: Departures,
+    loop: AxisLoop,
+    before: CommandInflow,
+    leaving: int,
+) -> tuple[FloatArray, CommandInflow] | UnprovedTransition:
+    """Return the largest efforts that robots are told to give in a transition, or which exceeds its limit.
+
+    Robots compute them by masses that are too large by the model's error at most, from accelerations that
+    they command and from nominal rates, ``ahead`` of now. What was commanded for the next transition, too.
+    """
+    budget, periods = loop.budget, len(found.pull) - 1
+    moving = np.stack([one.moving(periods, budget.period) for one in every], axis=-1)
+    rates = moving[1] + max(budget.ahead - budget.period, 0.0) * moving[0]
+    if rates.max() > QUICKEST:
+        return UnprovedTransition(k, int(rates.max(axis=0).argmax()), "may turn too fast to bound efforts")
+    laws = np.stack([one.commands(periods) for one in every], axis=-1)
+    commands, commanded = largest_commands(loop, laws, moving[0], found.entered.T, before, leaving)
+    of, believed = limited.efforts, 1.0 + budget.model_error
+    turning = np.einsum("tj,ejk,tk->te", rates, of.rates[k], rates)
+    turned = (1.0 + OTHERWISE) * commands @ of.axes[k].T + believed * turning + rates @ of.damping.T
+    effort: FloatArray = (1.0 + SLACK) * (limited.acceleration * of.push[k] + turned.max(axis=0))
+    if (effort <= of.limits).all():
+        return effort, commanded
+    worst = int((effort / of.limits).argmax())
+    said = f"{of.names[worst]} may be told to give {effort[worst]:.0f}, more than its {of.limits[worst]:.0f}"
+    return UnprovedTransition(k, None, said)
+
+
+def _entries(before: ProvedTransition, conditions: AxisConditions, periods: int) -> list[Entry]:
+    """Return the sets in which the axes enter the next transition, reports being used for some periods."""
+    pairs = zip(before.table, before.sets, strict=True)
+    return [_widened(next_entry(row, sets, conditions, periods)) for row, sets in pairs]
+
+
+def _sets(
+    k: int, table: FloatArray, entries: Sequence[Entry], conditions: AxisConditions
+) -> list[AxisSets] | UnprovedTransition:
+    """Return the sets of all axes of a transition, and write the condition of rest into its table."""
+    every = []
+    for axis, (row, entry) in enumerate(zip(table, entries, strict=True)):
+        for parts in ENTRY_PARTS:
+            sets = axis_sets(row, conditions, entry, parts)
+            if sets.distance > 0.0:
+                break
+        if not sets.distance > 0.0:
+            return UnprovedTransition(k, axis, "may leave its funnel")
+        if comes_near_limit(row, sets):
+            return UnprovedTransition(k, axis, "may come so near the limit of its rate that it is damped")
+        reach, rate = sets.settled, sets.settled_rate
+        half = (0.5 - EROSION) * (row[GOAL_UPPER] - row[GOAL_LOWER])
+        if not (1.0 + SLACK) * reach < half:
+            return UnprovedTransition(k, axis, "may never come to rest in its goal interval")
+        share = REST_SHARE * (row[GOAL_UPPER] - row[GOAL_LOWER])
+        row[REST_REACH] = min(half, max(REST_FACTOR * reach, share))
+        row[REST_RATE] = max(REST_FACTOR * rate, REST_SPEED)
+        every.append(sets)
+    return every
+
+
+def _widened(entry: Entry) -> Entry:
+    room, fast = SLACK * (entry.upper - entry.lower), SLACK * (entry.rate_upper - entry.rate_lower)
+    return replace(
+        entry,
+        lower=entry.lower - room,
+        upper=entry.upper + room,
+        rate_lower=entry.rate_lower - fast,
+        rate_upper=entry.rate_upper + fast,
+        acceleration=(1.0 + SLACK) * entry.acceleration,
+    )
+
 
 AGE_FACTORS = (1.0, 1.25, 1.6, 2.0, 2.3, 2.6, 3.0)
 """Gains are tried for so many times the age of what a nominal motion's commands rest on [-]: slow motions

@@ -25,10 +25,10 @@ from coop_drake.geometry.passage import pole
 from coop_drake.geometry.polygons import BoundaryDistance, component_at, parts_of
 from coop_drake.geometry.simplify import tidy_cell
 from coop_drake.laws import ScheduledGains
-from coop_drake.planning.budget.alarms import alarms_of, position_room, rubbed
-from coop_drake.planning.budget.position_tube import PositionGains, position_tubes
 from coop_drake.planning.duration import plan_time, timed
 from coop_drake.planning.transitions import find_route
+from coop_drake.robustness.alarms import alarms_of, position_room, rubbed
+from coop_drake.robustness.position import PositionGains, position_tubes
 from coop_drake.tree.pose import FloatArray
 
 SPEEDS = (2.0, 1.6, 1.3, 1.0, 0.7, 0.5, 0.35, 0.2)

@@ -23,13 +23,12 @@ from coop_drake.laws.actuators import ACCELERATION, RATE
 from coop_drake.laws.measurements import whole_periods
 from coop_drake.laws.nominal import lag_factors
 from coop_drake.laws.readiness import RATE_TOLERANCE
-from coop_drake.planning.budget.axis_departure import ACCELERATION as PUSHED
-from coop_drake.planning.budget.axis_departure import HORIZON, SLACK, AxisLoop
-from coop_drake.planning.budget.commands import single_noise
-from coop_drake.planning.budget.departing import moving_evenly
-from coop_drake.planning.budget.position_tube import HORIZON as POSITION_HORIZON
-from coop_drake.planning.budget.position_tube import E, V, position_errors, position_loop
-from coop_drake.planning.budget.transitions import OTHERWISE, LimitedEfforts
+from coop_drake.laws.sampling import whole_periods
+from coop_drake.planning.budget.fitting import OTHERWISE, LimitedEfforts
+from coop_drake.robustness.axis_departure import HORIZON, SLACK, AxisLoop, moving_evenly, single_noise
+from coop_drake.robustness.axis_departure import PUSH as PUSHED
+from coop_drake.robustness.position import HORIZON as POSITION_HORIZON
+from coop_drake.robustness.position import E, V, position_errors, position_loop
 from coop_drake.tree.pose import FloatArray
 
 ROUNDED = 1e-7

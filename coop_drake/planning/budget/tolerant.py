@@ -13,10 +13,12 @@ from coop_drake.answers.plan import Plan
 from coop_drake.answers.problem import PlanningProblem
 from coop_drake.errors import GeometryError, PlanError, StallError
 from coop_drake.laws import ScheduledGains
-from coop_drake.planning.budget.alarms import rubbed
-from coop_drake.planning.budget.axis_departure import COMMAND_WEIGHTS
-from coop_drake.planning.budget.coupling import QUICKEST, TeamCouplings, friction_pushes, team_couplings
-from coop_drake.planning.budget.fitting import acceleration_left, fit_budget, with_acceleration
+from coop_drake.planning.budget.fitting import (
+    UnprovedTransition,
+    acceleration_left,
+    fit_budget,
+    with_acceleration,
+)
 from coop_drake.planning.budget.position_fit import (
     UnprovedPosition,
     commanded_accelerations,
@@ -24,11 +26,13 @@ from coop_drake.planning.budget.position_fit import (
     unproved_position,
 )
 from coop_drake.planning.budget.restarting import position_may_rest
-from coop_drake.planning.budget.transitions import UnprovedTransition
 from coop_drake.planning.cell_selection import quickest_plan
 from coop_drake.planning.channel import Channel, CoveredPath
 from coop_drake.planning.duration import plan_time
 from coop_drake.progress import Progress
+from coop_drake.robustness.alarms import rubbed
+from coop_drake.robustness.axis_departure import COMMAND_WEIGHTS
+from coop_drake.robustness.couplings import QUICKEST, TeamCouplings, friction_pushes, team_couplings
 
 SHARE_STEP = 0.01
 """The largest share of a budget is found within this [-]."""
