@@ -1,11 +1,30 @@
-"""How far axes may depart from their nominal motions under a budget, and what is commanded of them."""
+"""How far an axis may depart from its nominal motion under a budget.
+
+Let e = x - x^ be the departure of an axis from its nominal motion, see ``laws/nominal_axes.py``. Robots
+command, at sample k and with measurements that are m periods old, L + q_k with the pull
+
+    q_k = -K_a (e_(k-m) + n_x) - zeta_a (e'_(k-m) + n_v),
+
+which acts with the same lag as L. With the acceleration a^ of the nominal motion, the lagged pull q and the
+factor 1 + epsilon by which the model makes accelerations too large, f being the middle of a part of its
+range,
+
+    e'' = f q + (1 + epsilon - f) q + epsilon a^ + w.
+
+The loop e'' = f q is linear and does not vary in time, so that |e| is at most the sum over all samples of
+its responses' magnitudes times the largest size of what enters: noise of a command, and accelerations. Hand-
+overs and funnels do not appear in it. Only a^ is larger in one transition than in another: what entered
+longer ago than ``MEMORY`` is counted with its largest size in the whole plan.
+
+Where the age of measurements may be wrong by s, what was measured belongs to another instant than the nominal
+state with which it is compared. So n_x is larger by s times the largest |x'| of the axis at any time, and n_v
+by s times its largest |x''|, which the plan states (``AxisTracking``).
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache
-from math import inf
 from typing import NamedTuple
 
 import numpy as np
@@ -16,30 +35,8 @@ from coop_drake.jit import compiled
 from coop_drake.laws.nominal_axes import lag_factors
 from coop_drake.laws.sampling import whole_periods
 from coop_drake.robustness.alarms import axis_errors, mistaken
-from coop_drake.robustness.nominal_axes import ACCELERATION, COLUMNS, AxisSets, V
+from coop_drake.robustness.nominal_axes import AxisSets, even_sets
 from coop_drake.tree.pose import FloatArray
-
-# How far an axis may depart from its nominal motion under a budget.
-#
-# Let e = x - x^ be the departure of an axis from its nominal motion, see ``laws/nominal_axes.py``. Robots
-# command, at sample k and with measurements that are m periods old, L + q_k with the pull
-#
-# q_k = -K_a (e_(k-m) + n_x) - zeta_a (e'_(k-m) + n_v),
-#
-# which acts with the same lag as L. With the acceleration a^ of the nominal motion, the lagged pull q and
-# the factor 1 + epsilon by which the model makes accelerations too large, f being the middle of a part of
-# its range,
-#
-# e'' = f q + (1 + epsilon - f) q + epsilon a^ + w.
-#
-# The loop e'' = f q is linear and does not vary in time, so that |e| is at most the sum over all samples of
-# its responses' magnitudes times the largest size of what enters: noise of a command, and accelerations.
-# Hand- overs and funnels do not appear in it. Only a^ is larger in one transition than in another: what
-# entered longer ago than ``MEMORY`` is counted with its largest size in the whole plan.
-#
-# Where the age of measurements may be wrong by s, what was measured belongs to another instant than the
-# nominal state with which it is compared. So n_x is larger by s times the largest |x'| of the axis at any
-# time, and n_v by s times its largest |x''|, which the plan states (``AxisTracking``).
 
 MODEL_PARTS = 5
 """Parts into which the range of the model's error is cut [-]; within each only the rest is a disturbance."""
@@ -55,23 +52,9 @@ MEMORY = 0.3
 """Time for which the accelerations of former transitions count with their own sizes [s]: less than a
 hundredth of a response of typical gains is left after it."""
 
-STIFFNESSES = (100.0, 150.0, 200.0, 250.0, 300.0, 400.0, 500.0, 700.0, 1000.0)
-"""K_a that are tried [1/s^2]; the narrowest tube is taken."""
-
-DAMPINGS = (1.2, 1.4, 1.7, 2.0, 2.5)
-"""zeta_a over the root of K_a that are tried [-]."""
-
 TYPICAL_ACCELERATION = 8.0
 """Acceleration of a nominal motion for which the gains are chosen [rad/s^2 or m/s^2]: two thirds of the
 largest one of a funnel's bound in the shipped rule of gains."""
-
-RATE_WEIGHT = 0.01
-"""What a departure of the rate counts beside one of the axis, where gains are chosen [s]: it takes its part
-of the limit of the rate."""
-
-COMMAND_WEIGHTS = (0.0005, 0.004)
-"""What noise in a command counts beside a departure of the axis, where efforts are limited [s^2]: for stiff
-loops, as an axis with little room needs them, and for soft ones, which take small efforts."""
 
 SLACK = 1e-3
 """Fraction by which stated bounds are wider than computed ones [-]: more than the responses after
@@ -139,29 +122,6 @@ class AxisLoop:
         found = noises[:, :PULL] + (steady + self.rest * pull)[:, None] * pushes[:, :PULL]
         away, fast = found.max(axis=0).tolist()
         return away, fast
-
-
-@lru_cache(maxsize=8)
-def best_loop(budget: Budget, disturbance: tuple[float, ...] = (), weight: float = 0.0) -> AxisLoop | None:
-    """Return the loop with the gains for which a typical axis departs least; None where none is stable.
-
-    Args:
-        budget: The budget.
-        disturbance: As that of ``AxisTracking``.
-        weight: What noise in a command counts beside a departure, see ``COMMAND_WEIGHTS`` [s^2].
-    """
-    best, least = None, inf
-    for stiffness in STIFFNESSES:
-        for damping in DAMPINGS:
-            tracking = AxisTracking(stiffness, damping * stiffness**0.5, disturbance=disturbance)
-            loop = axis_loop(tracking, budget)
-            if loop is None:
-                continue
-            away, fast = loop.typical()
-            found = away + RATE_WEIGHT * fast + weight * float(loop.noises(1)[:, :, PULL].max())
-            if found < least:
-                best, least = loop, found
-    return best
 
 
 def axis_loop(tracking: AxisTracking, budget: Budget) -> AxisLoop | None:
@@ -248,7 +208,7 @@ def _sums(
 # How far the axes of a plan may depart from their nominal motions in one transition, period by period.
 #
 # The departure e = x - x^ of an axis is the sum of its loop's responses to what enters it, see
-# ``axis_departure.py``. In one period this is at most
+# above. In one period this is at most
 #
 # d = |epsilon| (|a^| + c(w^)) + c(w^ + e'_1) - c(w^) + w + (1 + epsilon - f) q,
 #
@@ -365,11 +325,49 @@ def moving_evenly(loop: AxisLoop, coupling: FloatArray, moving: tuple[float, flo
         The largest ones of all times, arrays of shape (axes,).
     """
     axes, samples = len(coupling), loop.kicks.shape[2]
-    tube = np.zeros((samples, COLUMNS))
-    tube[:, ACCELERATION], tube[:, V] = moving[0], moving[1] - loop.budget.period * moving[0]
-    even = AxisSets((tube,), 0.0, moving[0], moving[0], 0.0, tube[0, V])
+    even = even_sets(samples, *moving, loop.budget.period)
     found, _ = departing(loop, [even] * axes, coupling, at_rest(loop, axes), samples)
     return Departures(*(one.max(axis=0) for one in found))
+
+
+def resting_axes(loop: AxisLoop, rest_rate: float) -> FloatArray:
+    """Return |e|, |e'|, |e''| and |q| because of a rate with which an axis is taken for resting, shape (4,).
+
+    The rate is there at the beginning, and it was in the measurements, too, that are used in the first m
+    periods, with any sign. Constant errors of the position are among those that the loop counts.
+
+    Args:
+        loop: The loop of all axes.
+        rest_rate: The rate [rad/s or m/s].
+    """
+    budget, (stiffness, damping) = loop.budget, (loop.tracking.stiffness, loop.tracking.damping)
+    T, delay = budget.period, whole_periods(budget.delay, budget.period)
+    left, in_v, in_x = lag_factors(T, budget.lag)
+    found = np.zeros(4)
+    for part, factor in enumerate(loop.factors):
+        most = np.zeros(3)
+        # The rate at the beginning, then one in each of the measurements that are used first.
+        for first in range(1 + delay):
+            e, v, q = [0.0] * (delay + 1), [0.0] * (delay + 1), 0.0
+            v[-1 - first] = rest_rate
+            largest = np.zeros(3)
+            if first:
+                v[-1] = 0.0
+            for _ in range(whole_periods(HORIZON, T)):
+                u = -stiffness * e[-1 - delay] - damping * v[-1 - delay]
+                largest = np.maximum(largest, np.abs([e[-1], v[-1], u]))
+                gap = q - u
+                e.append(e[-1] + T * v[-1] + factor * (0.5 * T * T * u + in_x * gap))
+                v.append(v[-1] + factor * (T * u + in_v * gap))
+                q = u + left * gap
+            most += largest
+        # The rest of the model's factor acts on this pull, and on what it causes itself.
+        sums = loop.sums[part, :, PUSH]
+        pull = most[2] / (1.0 - loop.rest * sums[2])
+        away, fast = most[:2] + loop.rest * pull * sums[:2]
+        push = (1.0 + budget.model_error) * pull
+        found = np.maximum(found, [away + 0.125 * T * T * push, fast + T * push, push, pull])
+    return found
 
 
 @compiled(borrows=True)
@@ -536,109 +534,3 @@ def _settle(
         found[:, ever] = np.inf
     entered[:, :, :, memory + ever] = most
     state[2] = np.maximum(state[2], now[2])
-
-
-# The largest commands of all axes in a transition, of which a robot computes its efforts.
-#
-# A robot commands L + q, its law and the pull towards the nominal motion. Where its masses are too large by
-# epsilon, its efforts are those of (1 + epsilon) (L + q) by the true masses. The pull makes up for what is
-# too much: with f the middle of a part of the range of 1 + epsilon and h the response of the pull to a unit
-# of command in one period,
-#
-# L_k + q_k = L_k + (f - 1) / f * (sum over j < k of h(k - j) L_j) + noise + answers to all else,
-#
-# in which L is the same at every place. It lies in an interval that is known for every period, so that the
-# first two terms are added with their signs. What is left of the disturbances d of ``departing.py`` is d -
-# |f - 1| |a^|, of any sign.
-
-
-class CommandInflow(NamedTuple):
-    """What was commanded, and what else entered the loops, before a cell is entered.
-
-    Attributes:
-        past: Of the periods before, the latest last: largest |L|, then for every part of the model's range
-            the largest disturbance, shape (1 + parts, axes, memory) [rad/s^2 or m/s^2].
-        largest: The same of all times before, shape (1 + parts, axes).
-    """
-
-    past: FloatArray
-    largest: FloatArray
-
-
-def nothing_commanded(loop: AxisLoop, axes: int) -> CommandInflow:
-    """Return what was commanded before the start, where all axes rest."""
-    parts, memory = loop.answers.shape
-    past = np.zeros((1 + parts, axes, memory))
-    past[1:] = axis_errors(loop.budget, loop.tracking, axes)[:, None]
-    return CommandInflow(past, past[..., 0])
-
-
-def single_noise(loop: AxisLoop, axes: int) -> FloatArray:
-    """Return by how much the noise in one robot's command may exceed that in the mean's, (axes,) [rad/s^2].
-
-    All robots measure the object's angle, each its own joints.
-    """
-    tracking, budget, noise = loop.tracking, loop.budget, np.zeros(axes)
-    direct = tracking.stiffness * budget.angle_noise + tracking.damping * budget.rate_noise
-    noise[0] = (budget.single_noise - 1.0) * direct
-    return noise
-
-
-def largest_commands(
-    loop: AxisLoop,
-    laws: FloatArray,
-    nominal: FloatArray,
-    entered: FloatArray,
-    before: CommandInflow,
-    leaving: int,
-) -> tuple[FloatArray, CommandInflow]:
-    """Return the largest (1 + epsilon) |L + q| of every period, and what the next transition needs.
-
-    Args:
-        loop: The loop of all axes.
-        laws: Least and largest L of every period, the last for ever, shape (2, periods + 1, axes).
-        nominal: Largest |a^| of every period, likewise, shape (periods + 1, axes).
-        entered: d of every period and part of the model's range, shape (parts, axes, periods + 1).
-        before: What was commanded before this transition.
-        leaving: The first sample at which the cell can be left.
-
-    Returns:
-        Shape (periods + 1, axes), the last one for ever [rad/s^2 or m/s^2]; and what the next one needs.
-    """
-    memory = loop.answers.shape[1]
-    rest = entered - np.abs(np.array(loop.factors) - 1.0)[:, None, None] * nominal.T
-    sizes = np.concatenate([np.abs(laws).max(axis=0).T[None], rest])
-    sizes = np.concatenate([before.past, sizes], axis=2)
-    sizes[..., -1] = sizes[..., -1 - memory :].max(axis=2)
-    lower, upper = (
-        np.concatenate([sign * before.past[0], one.T], axis=1)
-        for sign, one in zip((-1.0, 1.0), laws, strict=True)
-    )
-    lower[:, -1], upper[:, -1] = -sizes[0, :, -1], sizes[0, :, -1]
-    largest = np.maximum(before.largest, sizes[..., memory:].max(axis=2))
-    noises = loop.noises(len(lower))[:, :, PULL].T + single_noise(loop, len(lower))
-    found = np.zeros(laws.shape[1:])
-    for p, factor in enumerate(loop.factors):
-        pull = (factor - 1.0) / factor * loop.answers[p]
-        up, down = np.maximum(pull, 0.0), np.minimum(pull, 0.0)
-        late = abs(factor - 1.0) / factor * (loop.sums[p, PULL, COMMANDED] - np.abs(loop.answers[p]).sum())
-        high = upper[:, memory:] + _answered(upper, up) + _answered(lower, down)
-        low = lower[:, memory:] + _answered(lower, up) + _answered(upper, down)
-        others = _answered(sizes[1 + p], loop.kicks[p, PULL])
-        old = late * largest[0] + loop.sums[p, PULL, OLD] * largest[1 + p]
-        command = np.maximum(high, -low) + others + (noises[p] + old)[:, None]
-        found = np.maximum(found, (factor + loop.rest) * command.T)
-    highest = np.maximum.accumulate(sizes[..., ::-1], axis=2)[..., ::-1]
-    first = min(leaving, laws.shape[1])
-    return found, CommandInflow(highest[..., first : first + memory].copy(), largest)
-
-
-def _answered(sizes: FloatArray, weights: FloatArray) -> FloatArray:
-    """Return weighted sums of the periods before each one, the last one for ever, (axes, periods + 1).
-
-    Args:
-        sizes: Of the periods before the transition, of its own, and for ever, (axes, memory + periods + 1).
-        weights: The oldest first, shape (memory,).
-    """
-    windows = np.lib.stride_tricks.sliding_window_view(sizes[:, :-1], len(weights), axis=1)
-    return np.concatenate([windows[:, :-1] @ weights, sizes[:, -1:] * weights.sum()], axis=1)

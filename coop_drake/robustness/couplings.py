@@ -31,8 +31,7 @@ class Precision(NamedTuple):
         tolerance: Boxes are halved until a bound is at most this many times what is found in its cell [-].
         floor: Or at most this share of the largest number of its kind for the same axis more [-]:
             coefficients near zero matter little.
-        slack: Factor by which coefficients are larger than their bounds [-]: the verifier halves its boxes
-            until its bounds are above what is true by no more.
+        slack: Factor by which coefficients are larger than their bounds [-].
         slack_floor: What they have more of the largest number of their kind [-].
     """
 
@@ -81,11 +80,10 @@ def cell_couplings(budget: Budget, tree: ComponentTree, cells: Sequence[Cell]) -
         tree: The team.
         cells: The cells.
     """
+    if not budget.bodies:
+        return uncoupled(cells)
     n = len(tree.joints)
     axes, robots = 1 + n, budget.robots
-    if not budget.bodies:
-        rows = len(cells), 1 + axes
-        return Couplings(np.zeros((*rows, axes, axes)), np.zeros((*rows, 0, 2)), np.zeros((*rows, n)))
     system, pairs = _system(budget, tree), _pairs(axes)
     kinds = np.repeat([0, 1, 2], [len(pairs), 2 * robots, n])
     lower, upper = (np.array([getattr(cell, side)[1:] for cell in cells]) for side in ("lower", "upper"))
@@ -95,6 +93,13 @@ def cell_couplings(budget: Budget, tree: ComponentTree, cells: Sequence[Cell]) -
         rates[:, :, j, k] = most[:, :, p]
     pushes, efforts = most[:, :, kinds == 1], most[:, :, kinds == 2]
     return Couplings(rates, pushes.reshape(len(cells), 1 + axes, robots, 2), efforts)
+
+
+def uncoupled(cells: Sequence[Cell]) -> Couplings:
+    """Return the bounds of a budget without bodies, which are zero."""
+    axes = cells[0].lower.size
+    rows = len(cells), 1 + axes
+    return Couplings(np.zeros((*rows, axes, axes)), np.zeros((*rows, 0, 2)), np.zeros((*rows, axes - 1)))
 
 
 def friction_pushes(budget: Budget, couplings: Couplings, rates: FloatArray | float) -> FloatArray:

@@ -1,13 +1,38 @@
-"""The law of one axis as a straight line and a rest that is bounded."""
+"""The law of the axes as the bounds of budgets need it: prescribed performance in quintic funnels.
+
+A later law brings a module with the same functions: its command near a state as a straight line and a bounded
+rest, its line about rest once funnels are closed, when they are, and how slowly it comes to rest.
+"""
 
 from __future__ import annotations
 
 import numpy as np
 
 from coop_drake.jit import compiled
-from coop_drake.laws.axis_table import bounds_of, gains_of, saturated, slopes_between
-from coop_drake.laws.ppc import track_axis, track_distances
+from coop_drake.laws.axis_table import (
+    DECAY_RATE,
+    FADING_TIME,
+    GOAL_LOWER,
+    GOAL_UPPER,
+    POSITION_GAIN,
+    RAMP_RATE,
+    RATE_GAIN,
+    SATURATION,
+    bounds_of,
+    track_row,
+)
+from coop_drake.laws.funnels import CLOSING
+from coop_drake.laws.hand_over import fading
+from coop_drake.laws.ppc import ramped_gain, track_axis, track_distances
+from coop_drake.laws.slopes import gains_of, saturated, slope_bounds, slopes_between
 from coop_drake.tree.pose import FloatArray
+
+LONG_AFTER = 100.0
+"""Time at which gains are ramped in and funnels closed [s]."""
+
+
+RAMPED = 6.0
+"""mu t after which the gain k1 counts as ramped in [-]: a sixtieth of it is missing then."""
 
 PIECES = 8
 """Pieces into which the interval of positions is cut [-]: the law's curvature adds to the bound of the rest
@@ -88,3 +113,56 @@ def _tabulate(
         last = memory[PLACE, i + 1], memory[Q, i + 1], memory[S, i + 1]
         found = slopes_between(bounds, gains, first, last, rate)
         memory[X_LOWER, i], memory[X_UPPER, i], memory[V_LOWER, i], memory[V_UPPER, i] = found
+
+
+@compiled(borrows=True)
+def command_near(
+    row: FloatArray, time: float, state: tuple[float, float, float, float], jump: float, memory: FloatArray
+) -> tuple[float, float, float, float, float]:
+    """Return the undisturbed command, its two slopes, the size of its disturbance and its largest magnitude.
+
+    Args:
+        row: The axis.
+        time: Time since the cell was entered [s].
+        state: x of the undisturbed motion, the most that it may depart, and so for v.
+        jump: What is added to the command at the switch and fades.
+        memory: For ``fit_law``.
+    """
+    x, reach, v, fast = state
+    u = track_row(row, time, x, v)[0] + fading(time, row[FADING_TIME]) * jump
+    slope, by_rate, rest, spread = fit_law(row, time, x, reach, v, memory)
+    rest += spread * fast
+    return u, slope, by_rate, rest, abs(u) + abs(slope) * reach + abs(by_rate) * fast + rest
+
+
+@compiled
+def line_at_rest(row: FloatArray, time: float, x: float, v: float) -> tuple[float, float, float, float]:
+    """Return the law's slopes, the size of its rest and the largest |x''|, for departures up to x and v."""
+    k1, k1_dot = ramped_gain(time, row[POSITION_GAIN], row[RAMP_RATE])
+    lower, upper = bounds_of(row, time)[:2]
+    missing = row[POSITION_GAIN] - k1
+    slope, by_rate, rest, spread = fit_law(row, time, 0.5 * (lower + upper), x, 0.0, law_memory())
+    growing = (row[RATE_GAIN] * missing + k1_dot) * x
+    growing += missing * (1.0 - np.log(row[SATURATION])) * v  # |h| <= 1 + |s| <= 1 - ln(saturation)
+    rest += spread * v + growing
+    return slope, by_rate, rest, abs(slope) * x + abs(by_rate) * v + rest
+
+
+@compiled(borrows=True)
+def slowest_rate(row: FloatArray) -> float:
+    """Return the inverse of the law's slowest time constant about the middle of its closed funnel [1/s]."""
+    middle = 0.5 * (row[GOAL_LOWER] + row[GOAL_UPPER])
+    slopes = slope_bounds(row, LONG_AFTER, middle, 0.0, 0.0)
+    stiffness, damping = -slopes[0], -slopes[2]
+    return min(stiffness / damping, 0.5 * damping)
+
+
+def closed_after(row: FloatArray) -> float:
+    """Return the time after which the law counts as the one of the closed funnel [s]."""
+    ramped = RAMPED / row[RAMP_RATE] if row[RAMP_RATE] > 0.0 else 0.0
+    return float(max(max(CLOSING / row[DECAY_RATE], ramped), row[FADING_TIME]))
+
+
+def jump_at(row: FloatArray, position: float) -> float:
+    """Return what is added to the command at a switch and fades, for an axis at rest, see ``rest_jump``."""
+    return -float(track_row(row, 0.0, position, 0.0)[0])

@@ -1,4 +1,12 @@
-"""All nominal motions of one axis that enter a cell from a set: where they can be until the next cell is entered."""
+"""All nominal motions of one axis that enter a cell from a set, until the next cell is entered.
+
+A tube surrounds the motion from the set's middle. The sampled axis is linear but for its law: over a control
+period T the command u is held, and a first-order lag lets the acceleration p follow it, so that the state
+(x, v, p) is carried over exactly. The law is a line about the motion from the middle plus a bounded rest, see
+``funnel_law``. By superposition the departure of the state is the sum of its responses to the departure at
+entry and to every sample's rest, each bounded by the size of that times the magnitude of the response. The
+rest of a sample depends only on departures before it, so that one pass forward in time bounds all of them.
+"""
 
 from __future__ import annotations
 
@@ -12,38 +20,25 @@ import numpy as np
 from coop_drake.jit import compiled
 from coop_drake.laws.axis_table import (
     ACCELERATION_LIMIT,
-    DECAY_RATE,
-    FADING_TIME,
     GOAL_LOWER,
     GOAL_UPPER,
     LEAVING_TIME,
     LIMIT_GAIN,
-    POSITION_GAIN,
-    RAMP_RATE,
-    RATE_GAIN,
     RATE_LIMIT,
     REST_RATE,
     REST_REACH,
-    SATURATION,
     bounds_of,
-    track_row,
 )
-from coop_drake.laws.funnels import CLOSING
-from coop_drake.laws.hand_over import fading
 from coop_drake.laws.nominal_axes import lag_factors
-from coop_drake.laws.ppc import ramped_gain
-from coop_drake.laws.slopes import slope_bounds
-from coop_drake.robustness.funnel_law import fit_law, law_memory
+from coop_drake.robustness.funnel_law import (
+    closed_after,
+    command_near,
+    jump_at,
+    law_memory,
+    line_at_rest,
+    slowest_rate,
+)
 from coop_drake.tree.pose import FloatArray
-
-# All nominal motions of one axis that enter a cell from a set: a tube around the motion from its middle.
-#
-# The sampled axis is linear but for its law: over a control period T the command u is held, and a first-
-# order lag lets the acceleration p follow it, so that the state (x, v, p) is carried over exactly. The law
-# is a line about the motion from the middle plus a bounded rest, see ``fit_law``. By superposition the
-# departure of the state is the sum of its responses to the departure at entry and to every sample's rest,
-# each bounded by the size of that times the magnitude of the response. The rest of a sample depends only on
-# departures before it, so that one pass forward in time bounds all of them.
 
 X, X_REACH, V, V_REACH, ACCELERATION, DISTANCE, COMMAND, COMMAND_REACH = range(8)
 COLUMNS = 8
@@ -98,8 +93,7 @@ def follow_tube(
     lagging, memory = lag_factors(T, conditions.lag), law_memory()
     for k in range(n):
         state = x, x_reach, v, v_reach
-        faded = fading(k * T, row[FADING_TIME]) * jump
-        u, slope, by_rate, weight[3 + k], most = _command(row, k * T, state, faded, memory)
+        u, slope, by_rate, weight[3 + k], most = command_near(row, k * T, state, jump, memory)
         if k < LATE:  # all of the command, the old one or the new one, counts as a disturbance
             most = max(most, entry[4])
             u, slope, by_rate, weight[3 + k] = 0.0, 0.0, 0.0, most
@@ -112,26 +106,6 @@ def follow_tube(
         p = u + lagging[0] * gap
         x_reach, v_reach, p_reach = _respond(responses, weight, k, (T, slope, by_rate), lagging)
     return True
-
-
-@compiled(borrows=True)
-def _command(
-    row: FloatArray, time: float, state: tuple[float, float, float, float], faded: float, memory: FloatArray
-) -> tuple[float, float, float, float, float]:
-    """Return the undisturbed command, its two slopes, the size of its disturbance and its largest magnitude.
-
-    Args:
-        row: The axis.
-        time: Time since the cell was entered [s].
-        state: x of the undisturbed motion, the most that it may depart, and so for v.
-        faded: What is left of the jump of the command at the switch.
-        memory: For ``fit_law``.
-    """
-    x, reach, v, fast = state
-    u = track_row(row, time, x, v)[0] + faded
-    slope, by_rate, rest, spread = fit_law(row, time, x, reach, v, memory)
-    rest += spread * fast
-    return u, slope, by_rate, rest, abs(u) + abs(slope) * reach + abs(by_rate) * fast + rest
 
 
 @compiled(borrows=True)
@@ -204,9 +178,6 @@ is counted."""
 ATTEMPTS = 40
 """Largest number of larger and larger departures that are tried [-]."""
 
-LONG_AFTER = 100.0
-"""Time at which gains are ramped in and funnels closed [s]."""
-
 GROWTH = 1.01
 """Factor by which departures are enlarged for the next attempt [-]."""
 
@@ -222,12 +193,16 @@ class Settled(NamedTuple):
         acceleration: Largest |x''| [rad/s^2 or m/s^2].
         x: Largest departure from the middle [rad or m].
         rate: Largest rate [rad/s or m/s].
+        next_x: Largest departure at the next sample, if it was at most ``x`` before.
+        next_rate: Largest rate at the next sample, likewise.
     """
 
     distance: float
     acceleration: float
     x: float
     rate: float
+    next_x: float
+    next_rate: float
 
 
 @compiled
@@ -239,55 +214,60 @@ def settle(
     followed: tuple[float, float],
     samples: int,
 ) -> Settled:
-    """Bound an axis near the middle of its closed funnel for all later times.
+    """Return departures within which an axis stays for ever, the least of those that are tried.
 
-    The gain k1 may still grow a little: that is counted as a disturbance.
+    Arguments are those of ``staying``, but ``followed``: the most that x and v may depart from t0 until the
+    end of the tube.
+    """
+    x, v = followed
+    for _ in range(ATTEMPTS):
+        found = staying(row, conditions, time, entry, (x, v), samples)
+        if not found.distance > -np.inf:
+            break
+        if SPARE * found.next_x <= x and SPARE * found.next_rate <= v:
+            return found
+        x, v = max(x, GROWTH * found.next_x), max(v, GROWTH * found.next_rate)
+    return Settled(-1.0, np.inf, np.inf, np.inf, np.inf, np.inf)
+
+
+@compiled
+def staying(
+    row: FloatArray,
+    conditions: AxisConditions,
+    time: float,
+    entry: tuple[float, float, float],
+    held: tuple[float, float],
+    samples: int,
+) -> Settled:
+    """Return how far an axis departs at the next sample if it departed by no more than this before.
+
+    It then stays within these departures for ever if they are no less than the ones at the next sample. The
+    gain k1 may still grow a little: that is counted as a disturbance.
 
     Args:
         row: The axis, a row of an ``axis_table``.
         conditions: How its motion is computed.
         time: t0, not before the funnel is closed [s].
         entry: The most that x, v and x'' may depart from the middle, from rest and from zero at t0.
-        followed: The most that x and v may depart from t0 until the end of the tube.
+        held: The most that x and v may have departed at any sample.
         samples: Number of samples from t0 to the end of the tube, see ``tail_samples``.
     """
     lower, upper = bounds_of(row, time)[:2]
     half, T = 0.5 * (upper - lower), conditions.period
-    x, v = followed
-    for _ in range(ATTEMPTS):
-        if not x < half:
-            break
-        slope, by_rate, size, most = _line(row, time, x, v)
-        fastest = max(most, entry[2])
-        sums = _response_sums(conditions, slope, by_rate, entry, samples)
-        x_next, v_next = sums[0, 0] + sums[1, 0] * size, sums[0, 1] + sums[1, 1] * size
-        if SPARE * x_next <= x and SPARE * v_next <= v:
-            return Settled(half - x - 0.125 * T * T * fastest, fastest, x, v)
-        x, v = max(x, GROWTH * x_next), max(v, GROWTH * v_next)
-    return Settled(-1.0, np.inf, np.inf, np.inf)
+    x, v = held
+    if not x < half:
+        return Settled(-np.inf, np.inf, x, v, np.inf, np.inf)
+    slope, by_rate, size, most = line_at_rest(row, time, x, v)
+    fastest = max(most, entry[2])
+    sums = _response_sums(conditions, slope, by_rate, entry, samples)
+    x_next, v_next = sums[0, 0] + sums[1, 0] * size, sums[0, 1] + sums[1, 1] * size
+    return Settled(half - x - 0.125 * T * T * fastest, fastest, x, v, x_next, v_next)
 
 
 @compiled(borrows=True)
 def tail_samples(row: FloatArray, conditions: AxisConditions) -> int:
     """Return for how many samples an axis is followed after its funnel is closed, ``TIME_CONSTANTS`` long."""
-    middle = 0.5 * (row[GOAL_LOWER] + row[GOAL_UPPER])
-    slopes = slope_bounds(row, LONG_AFTER, middle, 0.0, 0.0)
-    stiffness, damping = -slopes[0], -slopes[2]
-    slowest = min(stiffness / damping, 0.5 * damping)
-    return int(np.ceil(TIME_CONSTANTS / (slowest * conditions.period))) + 2
-
-
-@compiled
-def _line(row: FloatArray, time: float, x: float, v: float) -> tuple[float, float, float, float]:
-    """Return the law's slopes, the size of its rest and the largest |x''|, for departures up to x and v."""
-    k1, k1_dot = ramped_gain(time, row[POSITION_GAIN], row[RAMP_RATE])
-    lower, upper = bounds_of(row, time)[:2]
-    missing = row[POSITION_GAIN] - k1
-    slope, by_rate, rest, spread = fit_law(row, time, 0.5 * (lower + upper), x, 0.0, law_memory())
-    growing = (row[RATE_GAIN] * missing + k1_dot) * x
-    growing += missing * (1.0 - np.log(row[SATURATION])) * v  # |h| <= 1 + |s| <= 1 - ln(saturation)
-    rest += spread * v + growing
-    return slope, by_rate, rest, abs(slope) * x + abs(by_rate) * v + rest
+    return int(np.ceil(TIME_CONSTANTS / (slowest_rate(row) * conditions.period))) + 2
 
 
 @compiled
@@ -348,12 +328,6 @@ def _response_sums(
     return result
 
 
-# The sets of one axis in one transition, and the set in which it can enter the next one.
-
-RAMPED = 6.0
-"""mu t after which the gain k1 counts as ramped in [-]: a sixtieth of it is missing then."""
-
-
 @dataclass(frozen=True)
 class Entry:
     """The set of states in which an axis enters a transition.
@@ -390,6 +364,8 @@ class AxisSets:
         settled_rate: Largest rate once the funnel is closed [rad/s or m/s].
         parts: Into how many parts the positions at the entry were cut.
         settled_distance: As ``distance``, once the funnel is closed.
+        needed: The least departure and rate that follow from ``settled`` and ``settled_rate``, which hold for
+            ever where they are no less.
     """
 
     tubes: tuple[FloatArray, ...]
@@ -400,6 +376,7 @@ class AxisSets:
     settled_rate: float = np.inf
     parts: int = 1
     settled_distance: float = 0.0
+    needed: tuple[float, float] = (np.inf, np.inf)
 
     def spare(self, departures: FloatArray) -> float:
         """Return the least distance to the funnel's bounds of an axis that departs [rad or m].
@@ -437,23 +414,34 @@ class AxisSets:
         return float((self.moving(len(departures) - 1, period)[1] + departures).max())
 
 
-def axis_sets(row: FloatArray, conditions: AxisConditions, entry: Entry, parts: int) -> AxisSets:
+def axis_sets(
+    row: FloatArray,
+    conditions: AxisConditions,
+    entry: Entry,
+    parts: int,
+    settled: tuple[float, float] | None = None,
+) -> AxisSets:
     """Bound a nominal motion from its entry on for all times.
 
     Args:
         row: The axis, a row of an ``axis_table``, with a quintic funnel.
-        conditions: How the motion is computed.
+        conditions: How its motion is computed.
         entry: The set in which it enters.
         parts: Into how many parts the positions at the entry are cut, each with a tube of its own.
+        settled: Departures from the middle and rates that are stated for all times after the funnel is
+            closed, of which ``needed`` tells whether they are; the least ones are looked for if not given.
     """
     T, middle = conditions.period, 0.5 * (row[GOAL_LOWER] + row[GOAL_UPPER])
-    closed = max(CLOSING / row[DECAY_RATE], RAMPED / row[RAMP_RATE] if row[RAMP_RATE] > 0.0 else 0.0)
-    begin, tail = ceil(max(closed, row[FADING_TIME]) / T), tail_samples(row, conditions)
+    begin, tail = ceil(closed_after(row) / T), tail_samples(row, conditions)
     tubes = _tubes(row, conditions, entry, parts, begin + tail + 1)
     if not tubes:
         return AxisSets((), 0.0)
     ends = np.array([_closed_part(tube[begin:], middle) for tube in tubes]).max(axis=0).tolist()
-    kept = settle(row, conditions, begin * T, (ends[0], ends[1], ends[2]), (ends[3], ends[4]), tail)
+    box = ends[0], ends[1], ends[2]
+    if settled is None:
+        kept = settle(row, conditions, begin * T, box, (ends[3], ends[4]), tail)
+    else:
+        kept = staying(row, conditions, begin * T, box, settled, tail)
     most = max(kept.acceleration, *(float(tube[:, ACCELERATION].max()) for tube in tubes))
     return AxisSets(
         tuple(tubes),
@@ -464,6 +452,7 @@ def axis_sets(row: FloatArray, conditions: AxisConditions, entry: Entry, parts: 
         kept.rate,
         parts,
         kept.distance,
+        (max(ends[3], kept.next_x), max(ends[4], kept.next_rate)),
     )
 
 
@@ -485,7 +474,7 @@ def _tubes(
     half = 0.5 * (entry.upper - entry.lower) / parts
     fast, reach = 0.5 * (entry.rate_lower + entry.rate_upper), 0.5 * (entry.rate_upper - entry.rate_lower)
     rest = 0.5 * (entry.lower + entry.upper) if entry.rest is None else entry.rest
-    tubes, jump = [], -track_row(row, 0.0, rest, 0.0)[0]
+    tubes, jump = [], jump_at(row, rest)
     for i in range(parts):
         tube = np.zeros((samples, COLUMNS))
         middle = float(entry.lower + (2 * i + 1) * half)
@@ -494,9 +483,6 @@ def _tubes(
             return []
         tubes.append(tube)
     return tubes
-
-
-# Whether limits of rate or acceleration may act on an axis under a budget.
 
 
 def comes_near_limit(row: FloatArray, sets: AxisSets) -> bool:
@@ -521,8 +507,6 @@ def comes_near_limit(row: FloatArray, sets: AxisSets) -> bool:
         return False
     return bool((rates * accelerations > 0.5 * row[LIMIT_GAIN] * (limit * limit - rates * rates)).any())
 
-
-# When an axis may leave its cell, and the set of states in which it can enter the next one.
 
 EARLIER = 4
 """By how many samples earlier a cell may be left than the tubes say: another approximation of the law gives
@@ -639,3 +623,10 @@ def _switching(
         for i in range(max(k - since, leaving), k + 1):
             found[5] = max(found[5], tube[i, ACCELERATION])
     return found
+
+
+def even_sets(samples: int, acceleration: float, rate: float, period: float) -> AxisSets:
+    """Return the sets of an axis that moves within the same acceleration and rate at all times."""
+    tube = np.zeros((samples, COLUMNS))
+    tube[:, ACCELERATION], tube[:, V] = acceleration, rate - period * acceleration
+    return AxisSets((tube,), 0.0, acceleration, acceleration, 0.0, tube[0, V])

@@ -34,6 +34,9 @@ E, V, S, Q, R = range(5)
 """State: e [m], e' [m/s], s [m/s^2], p^ - p_G [m], p^' [m/s]; then older e, e' for a delay."""
 
 
+ROUNDED = 1e-7
+"""What may be left of responses after the horizon [m, m/s, m/s^2]."""
+
 AHEAD = 6
 """Row of e + t e' among responses."""
 
@@ -65,12 +68,15 @@ class PositionGains:
         return self.stiffness, self.damping, self.tracking_stiffness, self.tracking_damping
 
 
-def position_tubes(gains: Sequence[PositionGains], budget: Budget) -> list[PositionTube | None]:
-    """Return the tube of each choice of gains under a budget, None where the loop is not stable.
+def position_bounds(gains: Sequence[PositionGains], budget: Budget) -> list[FloatArray | None]:
+    """Return the least bounds of each choice of gains under a budget, None where the loop is not stable.
 
     Args:
         gains: The choices.
         budget: The departures to be tolerated.
+
+    Returns:
+        Of each radius, rate, velocity, rest, acceleration and what is ahead, as in a tube, shape (6,).
     """
     worst: list[FloatArray | None] = [np.zeros(6) for _ in gains]
     for error in position_errors(budget):
@@ -78,8 +84,14 @@ def position_tubes(gains: Sequence[PositionGains], budget: Budget) -> list[Posit
         for i, own in enumerate(gains):
             before, found = worst[i], _bounds(own, budget, sums[own.loop], error)
             worst[i] = None if before is None or found is None else np.maximum(before, found)
+    return worst
+
+
+def position_tubes(gains: Sequence[PositionGains], budget: Budget) -> list[PositionTube | None]:
+    """Return the tube of each choice of gains under a budget, None where the loop is not stable."""
     return [
-        None if bounds is None else _stated(own, bounds) for own, bounds in zip(gains, worst, strict=True)
+        None if bounds is None else _stated(own, bounds)
+        for own, bounds in zip(gains, position_bounds(gains, budget), strict=True)
     ]
 
 
@@ -247,3 +259,54 @@ def _flow(stiffness: float, damping: float, T: float, lag: float, error: float) 
         motion[V, 5] = 1.0 + error
     flow: FloatArray = expm(T * motion)
     return flow
+
+
+def position_may_rest(
+    tube: PositionTube, governor: tuple[float, float], budget: Budget, rest_rate: float
+) -> bool:
+    """Whether a tube holds for an object that is taken for resting with a small rate, too.
+
+    Nothing entered the loop before the rest, of which the tube counts errors at all times.
+
+    With g the response to a unit of e' at the beginning, and h and h_w those to a unit of command and of
+    acceleration in one period, this is so if at every sample k, for e, e' and the feedback,
+
+        rest_rate (|g(k)| + zeta_t sum over i < m of |h(k - i)|)
+            <= sum over j > k of (zeta_t n_v |h(j)| + w |h_w(j)|),
+
+    for a rest that is off by n_p takes its part K_t n_p of what the tube counts.
+
+    Args:
+        tube: The tube.
+        governor: K [1/s^2] and zeta [1/s] of the nominal motion.
+        budget: The budget.
+        rest_rate: The rate [m/s].
+    """
+    T, delay = budget.period, whole_periods(budget.delay, budget.period)
+    tracking = tube.tracking_stiffness, tube.tracking_damping
+    for error in position_errors(budget):
+        loop = position_loop((*governor, *tracking), T, delay, budget.lag, error)
+        command, rate, place = _responses(*loop[:3], whole_periods(HORIZON, T))
+        pushed = 0.5 * T * (np.abs(place * T + rate) + np.abs(rate))
+        entered = tracking[1] * budget.velocity_noise * np.abs(command)
+        left = (entered + budget.acceleration_error * pushed)[::-1].cumsum(axis=0)[::-1]
+        seen = np.abs(rate)
+        for i in range(delay):
+            seen[i:] += tracking[1] * np.abs(command[: len(command) - i])
+        caused = rest_rate * seen
+        if not (caused[:-1] <= left[1:] + ROUNDED).all():
+            return False
+    return True
+
+
+def _responses(
+    matrix: FloatArray, held: FloatArray, feedback: FloatArray, samples: int
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return e, e' and the feedback after a unit of command, of e' and of e, each of shape (samples, 3)."""
+    state = np.zeros((len(held), 3))
+    state[:, 0], state[V, 1], state[E, 2] = held, 1.0, 1.0
+    found = np.empty((samples, 3, 3))
+    for k in range(samples):
+        found[k] = state[E], state[V], feedback @ state
+        state = matrix @ state
+    return found[..., 0], found[..., 1], found[..., 2]

@@ -22,14 +22,8 @@ from coop_drake.checking import RefusedError, check
 from coop_drake.errors import RefusalError
 from coop_drake.laws import GainSet
 from coop_drake.progress import Progress
-from coop_drake.verification.budgets import (
-    ScenarioBudgets,
-    check_budget,
-    check_efforts,
-    check_origin,
-    check_position,
-    check_restart,
-)
+from coop_drake.verification.budget import check_budget, check_efforts, check_position, check_restart
+from coop_drake.verification.budget_origin import ScenarioBudgets, check_origin
 from coop_drake.verification.checks import Check, Verified
 from coop_drake.verification.gains import check_accelerations, check_gains, check_limits, check_speeds
 from coop_drake.verification.question import question_of

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from functools import lru_cache
+from math import inf
 
 import numpy as np
 
 from coop_drake.answers.budget import AxisTracking, Budget, Tolerance
 from coop_drake.answers.plan import Plan, Transition
 from coop_drake.answers.problem import PlanningProblem
+from coop_drake.answers.restart import Restart
 from coop_drake.laws import ScheduledGains
 from coop_drake.laws.axis_table import (
     ACCELERATION_LIMIT,
@@ -22,24 +24,24 @@ from coop_drake.laws.axis_table import (
     REST_REACH,
     axis_table,
 )
+from coop_drake.laws.beginning import ACCELERATION, RATE
 from coop_drake.laws.gains import IDEAL_AGE, RestCondition
-from coop_drake.laws.readiness import EROSION
+from coop_drake.laws.readiness import EROSION, RATE_TOLERANCE
 from coop_drake.laws.sampling import whole_periods
-from coop_drake.planning.budget.restarting import reached_at_restart, with_restart
 from coop_drake.planning.transitions import share_speeds, with_gains
 from coop_drake.robustness.alarms import axis_noises, least_distance
 from coop_drake.robustness.axis_departure import (
+    HORIZON,
+    PULL,
     SLACK,
     AxisLoop,
-    CommandInflow,
     Departures,
     Inflow,
     at_rest,
     axis_loop,
-    best_loop,
     departing,
-    largest_commands,
-    nothing_commanded,
+    moving_evenly,
+    resting_axes,
 )
 from coop_drake.robustness.couplings import (
     QUICKEST,
@@ -48,6 +50,14 @@ from coop_drake.robustness.couplings import (
     TeamCouplings,
     friction_pushes,
     team_couplings,
+)
+from coop_drake.robustness.efforts import (
+    CommandInflow,
+    LimitedEfforts,
+    even_efforts,
+    nothing_commanded,
+    single_noise,
+    transition_efforts,
 )
 from coop_drake.robustness.nominal_axes import (
     AxisConditions,
@@ -76,24 +86,11 @@ ATTEMPTS = 12
 """Largest number of attempts to get beyond a transition, with other gains of it or of those before it [-]."""
 
 OTHERWISE = 0.01
-"""Fraction by which departures are enlarged [-]: another approximation of the law gives other tubes, and up
-to 0.3 % larger departures."""
+"""Fraction by which departures are enlarged [-]: numbers that machines round otherwise give sets that differ
+by far less."""
 
 ENTRY_PARTS = (1, 3)
 """Parts into which the positions at an entry are cut, tried in this order [-]."""
-
-
-class LimitedEfforts(NamedTuple):
-    """What limits efforts.
-
-    Attributes:
-        efforts: What efforts accelerations take in every cell.
-        acceleration: Largest acceleration that a robot commands for the object's origin, by the true masses,
-            see ``PositionTube`` [m/s^2].
-    """
-
-    efforts: Efforts
-    acceleration: float
 
 
 @dataclass(frozen=True)
@@ -223,45 +220,19 @@ def _attempt(
     if limited is not None:
         commanded = before.commanded if isinstance(before, ProvedTransition) else None
         commanded = commanded or nothing_commanded(loop, len(every))
-        asked = _effort(k, limited, every, found, loop, commanded, leaving)
-        if isinstance(asked, UnprovedTransition):
-            return asked
-        effort, commanded = asked
+        effort, rates, commanded = transition_efforts(
+            k, limited, every, found, loop, commanded, leaving, OTHERWISE
+        )
+        if rates.max() > QUICKEST:
+            return UnprovedTransition(k, int(rates.argmax()), "may turn too fast to bound efforts")
+        of, effort = limited.efforts, (1.0 + SLACK) * effort
+        if not (effort <= of.limits).all():
+            worst = int((effort / of.limits).argmax())
+            most = f"{effort[worst]:.0f}, more than its {of.limits[worst]:.0f}"
+            return UnprovedTransition(k, None, f"{of.names[worst]} may be told to give {most}")
     return ProvedTransition(
         table, entries, every, spare, departure, rate_departure, reached, effort, inflow, commanded
     )
-
-
-def _effort(
-    k: int,
-    limited: LimitedEfforts,
-    every: Sequence[AxisSets],
-    found: Departures,
-    loop: AxisLoop,
-    before: CommandInflow,
-    leaving: int,
-) -> tuple[FloatArray, CommandInflow] | UnprovedTransition:
-    """Return the largest efforts that robots are told to give in a transition, or which exceeds its limit.
-
-    Robots compute them by masses that are too large by the model's error at most, from accelerations that
-    they command and from nominal rates, ``ahead`` of now. What was commanded for the next transition, too.
-    """
-    budget, periods = loop.budget, len(found.pull) - 1
-    moving = np.stack([one.moving(periods, budget.period) for one in every], axis=-1)
-    rates = moving[1] + max(budget.ahead - budget.period, 0.0) * moving[0]
-    if rates.max() > QUICKEST:
-        return UnprovedTransition(k, int(rates.max(axis=0).argmax()), "may turn too fast to bound efforts")
-    laws = np.stack([one.commands(periods) for one in every], axis=-1)
-    commands, commanded = largest_commands(loop, laws, moving[0], found.entered.T, before, leaving)
-    of, believed = limited.efforts, 1.0 + budget.model_error
-    turning = np.einsum("tj,ejk,tk->te", rates, of.rates[k], rates)
-    turned = (1.0 + OTHERWISE) * commands @ of.axes[k].T + believed * turning + rates @ of.damping.T
-    effort: FloatArray = (1.0 + SLACK) * (limited.acceleration * of.push[k] + turned.max(axis=0))
-    if (effort <= of.limits).all():
-        return effort, commanded
-    worst = int((effort / of.limits).argmax())
-    said = f"{of.names[worst]} may be told to give {effort[worst]:.0f}, more than its {of.limits[worst]:.0f}"
-    return UnprovedTransition(k, None, said)
 
 
 def _entries(before: ProvedTransition, conditions: AxisConditions, periods: int) -> list[Entry]:
@@ -306,6 +277,26 @@ def _widened(entry: Entry) -> Entry:
         acceleration=(1.0 + SLACK) * entry.acceleration,
     )
 
+
+STIFFNESSES = (100.0, 150.0, 200.0, 250.0, 300.0, 400.0, 500.0, 700.0, 1000.0)
+"""K_a that are tried [1/s^2]; the narrowest tube is taken."""
+
+
+DAMPINGS = (1.2, 1.4, 1.7, 2.0, 2.5)
+"""zeta_a over the root of K_a that are tried [-]."""
+
+
+RATE_WEIGHT = 0.01
+"""What a departure of the rate counts beside one of the axis, where gains are chosen [s]: it takes its part
+of the limit of the rate."""
+
+
+COMMAND_WEIGHTS = (0.0005, 0.004)
+"""What noise in a command counts beside a departure of the axis, where efforts are limited [s^2]: for stiff
+loops, as an axis with little room needs them, and for soft ones, which take small efforts."""
+
+SLOWER = (1.0, 0.5, 0.25, 0.1)
+"""Shares of the usual rate and acceleration that are tried, where limits allow no more [-]."""
 
 AGE_FACTORS = (1.0, 1.25, 1.6, 2.0, 2.3, 2.6, 3.0)
 """Gains are tried for so many times the age of what a nominal motion's commands rest on [-]: slow motions
@@ -484,3 +475,76 @@ def _tolerance(factor: float, passed: ProvedTransition, loop: AxisLoop) -> Toler
         effort=passed.effort,
         entry_parts=tuple(sets.parts for sets in every),
     )
+
+
+@lru_cache(maxsize=8)
+def best_loop(budget: Budget, disturbance: tuple[float, ...] = (), weight: float = 0.0) -> AxisLoop | None:
+    """Return the loop with the gains for which a typical axis departs least; None where none is stable.
+
+    Args:
+        budget: The budget.
+        disturbance: As that of ``AxisTracking``.
+        weight: What noise in a command counts beside a departure, see ``COMMAND_WEIGHTS`` [s^2].
+    """
+    best, least = None, inf
+    for stiffness in STIFFNESSES:
+        for damping in DAMPINGS:
+            tracking = AxisTracking(stiffness, damping * stiffness**0.5, disturbance=disturbance)
+            loop = axis_loop(tracking, budget)
+            if loop is None:
+                continue
+            away, fast = loop.typical()
+            found = away + RATE_WEIGHT * fast + weight * float(loop.noises(1)[:, :, PULL].max())
+            if found < least:
+                best, least = loop, found
+    return best
+
+
+# How far axes depart where a team begins a cell anew from rest, see ``answers/restart.py``. On the slow way
+# of ``laws/beginning.py`` every axis has at most a rate and an acceleration that are the same in all cells.
+# The departures follow as in a transition, from a rest with constant errors: before it and at all samples
+# that are still to be used, what was measured is where the nominal motion is. An axis that is taken for
+# resting may have a small rate still: what this causes is added, by superposition.
+
+
+def with_restart(plan: Plan, loop: AxisLoop, couplings: FloatArray, limited: LimitedEfforts | None) -> Plan:
+    """Return a plan that states from which rests its cells can be begun anew.
+
+    Args:
+        plan: The plan with its budget and the gains of its axes.
+        loop: The loop that pulls the axes to their nominal motions.
+        couplings: How much rates accelerate the axes in every cell.
+        limited: What limits efforts, None where nothing does.
+
+    Returns:
+        The plan; without such a statement where limits allow no motion of the usual kind.
+    """
+    every = [transition.gains for transition in plan.transitions]
+    counted = loop.tracking.rate or None, loop.tracking.acceleration or None  # with which wrong ages count
+    resting = resting_axes(loop, RATE_TOLERANCE)
+    for share in SLOWER:
+        rate, acceleration = share * RATE, share * ACCELERATION
+        found = [moving_evenly(loop, coupling, (acceleration, rate)) for coupling in couplings]
+        within = [
+            (fastest is None or (rate + one.rate + resting[1] < fastest).all())
+            and (most is None or (acceleration + one.acceleration + resting[2] < most).all())
+            for one, limits in zip(found, every, strict=True)
+            for fastest, most in ((limits.rate_limit, limits.acceleration_limit), counted)
+        ]
+        pulls = np.array([one.pull + resting[2] + single_noise(loop, len(one.pull)) for one in found])
+        if limited is not None:
+            efforts = (1.0 + SLACK) * even_efforts(limited, loop.budget, (rate, acceleration), pulls)
+            within += [bool((efforts <= limited.efforts.limits).all())]
+        if all(within):
+            departures = tuple((1.0 + OTHERWISE) * (one.position + resting[0]) for one in found)
+            return replace(plan, restart=Restart(rate, acceleration, RATE_TOLERANCE, HORIZON, departures))
+    return plan
+
+
+def reached_at_restart(loop: AxisLoop, couplings: FloatArray) -> FloatArray:
+    """Return the largest rates and accelerations of axes on the usual slow way, shape (2, axes)."""
+    _, fast, push, _ = resting_axes(loop, RATE_TOLERANCE)
+    every = [moving_evenly(loop, coupling, (ACCELERATION, RATE)) for coupling in couplings]
+    reached = np.array([[RATE + one.rate + fast, ACCELERATION + one.acceleration + push] for one in every])
+    most: FloatArray = (1.0 + OTHERWISE) * reached.max(axis=0)
+    return most

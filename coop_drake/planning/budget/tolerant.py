@@ -14,6 +14,7 @@ from coop_drake.answers.problem import PlanningProblem
 from coop_drake.errors import GeometryError, PlanError, StallError
 from coop_drake.laws import ScheduledGains
 from coop_drake.planning.budget.fitting import (
+    COMMAND_WEIGHTS,
     UnprovedTransition,
     acceleration_left,
     fit_budget,
@@ -25,14 +26,13 @@ from coop_drake.planning.budget.position_fit import (
     fit_position,
     unproved_position,
 )
-from coop_drake.planning.budget.restarting import position_may_rest
 from coop_drake.planning.cell_selection import quickest_plan
 from coop_drake.planning.channel import Channel, CoveredPath
 from coop_drake.planning.duration import plan_time
 from coop_drake.progress import Progress
 from coop_drake.robustness.alarms import rubbed
-from coop_drake.robustness.axis_departure import COMMAND_WEIGHTS
 from coop_drake.robustness.couplings import QUICKEST, TeamCouplings, friction_pushes, team_couplings
+from coop_drake.robustness.position import position_may_rest
 
 SHARE_STEP = 0.01
 """The largest share of a budget is found within this [-]."""
@@ -184,8 +184,11 @@ def _fitted(
 ) -> Plan | UnprovedTransition | UnprovedPosition:
     """Return what ``_held`` does; a plan states nothing about rests from which its position is not held."""
     found = _held(problem, plan, gain_set, budget, team)
-    if isinstance(found, Plan) and not position_may_rest(found, rubbed(budget, found.axis_tracking)):
-        return replace(found, restart=None)
+    if isinstance(found, Plan) and found.restart is not None and found.tube is not None:
+        governor, pushed = found.transitions[0].gains, rubbed(budget, found.axis_tracking)
+        speeds = governor.stiffness, governor.damping
+        if not position_may_rest(found.tube, speeds, pushed, found.restart.rest_rate):
+            return replace(found, restart=None)
     return found
 
 

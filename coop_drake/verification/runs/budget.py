@@ -8,8 +8,9 @@ axes, which acts on themselves. In a run with holds they have a clock that stand
 
 from __future__ import annotations
 
+from cmath import cosh, sinh, sqrt
 from collections.abc import Sequence
-from math import ceil, inf, nan
+from math import ceil, exp, inf, nan
 from typing import NamedTuple
 
 import numpy as np
@@ -18,9 +19,6 @@ import shapely
 from coop_drake.answers.plan import Plan
 from coop_drake.errors import RefusalError
 from coop_drake.tree.pose import FloatArray, IntArray
-from coop_drake.verification.budgets.axis_law import axes_of, law
-from coop_drake.verification.budgets.position_loop import oscillator
-from coop_drake.verification.budgets.tubes import Nominal
 from coop_drake.verification.checks import Check
 from coop_drake.verification.runs.laws import signed_distances
 from coop_drake.verification.runs.rows import Rows
@@ -272,17 +270,83 @@ def nominal_axes(rows: Rows, first: IntArray) -> FloatArray:
     """
     plan, log, count = rows.plan, rows.log, rows.z.shape[1] - 2
     assert plan.budget is not None  # checked by the caller
-    axes, nothing = [axes_of(plan, k) for k in range(len(plan.cells))], np.zeros(count)
+    nothing = np.zeros(count)
     rests = [plan.start[2:], *(0.5 * (one.goal_lower + one.goal_upper) for one in plan.transitions[:-1])]
-    jumps = [-law(own, 0.0, rest, nothing) for own, rest in zip(axes, rests, strict=True)]
-    matrix, enters = Nominal(axes[0], plan.budget.period, plan.budget.lag).carry
+    jumps = [-commanded(plan, k, 0.0, rest, nothing) for k, rest in enumerate(rests)]
+    T, lag = plan.budget.period, plan.budget.lag
+    left = exp(-T / lag) if lag > 0.0 else 0.0
+    in_v = lag * (1.0 - left)
+    in_x = lag * (T - in_v)
+    matrix = np.array([[1.0, T, in_x], [0.0, 1.0, in_v], [0.0, 0.0, left]])  # of (x, v, acceleration)
+    enters = np.array([0.5 * T * T - in_x, T - in_v, 1.0 - left])
     state, states = np.array([plan.start[2:], nothing, nothing]), np.empty((len(first), 2, count))
     for i, row in enumerate(first):
         states[i] = state[:2]
         cell, time = int(log.cell_index[row]), float(log.times[row] - log.transition_start[row])
-        command = law(axes[cell], time, state[0], state[1]) + axes[cell].left(time) * jumps[cell]
+        fading = np.maximum(plan.transitions[cell].gains.hand_over_time, 1e-12)
+        command = commanded(plan, cell, time, state[0], state[1]) + _left(time / fading)[0] * jumps[cell]
         state = matrix @ state + enters[:, None] * command
     return states
+
+
+def commanded(plan: Plan, cell: int, time: float, x: FloatArray, v: FloatArray) -> FloatArray:
+    """Return the accelerations that the law asks of all axes, written again in distances to the bounds.
+
+    With the distances dl and du to the funnel's bounds, w = dl + du, s = ln(dl / du), P = s (dl - du) / w,
+    and b, c the rates and accelerations with which the funnel carries a point along, the law is
+
+        (k2 + k1 (1 - P) - w'/w) (b - v) + c - s dl du (k1 k2 + k1 w'/w + k1') / w - kappa w s / (dl du).
+
+    Args:
+        plan: A plan with quintic funnels.
+        cell: The cell.
+        time: Time since it was entered [s].
+        x: Axes (theta, q...), shape (1 + n,) [rad or m].
+        v: Their rates, shape (1 + n,) [rad/s or m/s].
+    """
+    transition, entered = plan.transitions[cell], plan.cells[cell]
+    gains, goal = transition.gains, np.array([transition.goal_lower, transition.goal_upper])
+    shrink, rate = np.array([entered.lower, entered.upper]) - goal, gains.decay_rate / 5.0
+    share, first, second = _left(time * rate)
+    (low, high), (low_rate, high_rate) = goal + shrink * share, shrink * rate * first
+    low_bend, high_bend = shrink * rate**2 * second
+    mu, k1, k1_rate, k2 = gains.ramp_rate, gains.position_gain, 0.0, gains.rate_gain
+    if mu > 0.0:
+        gone = exp(-mu * time)
+        k1, k1_rate = k1 * (1.0 - gone - mu * time * gone), k1 * mu**2 * time * gone
+    w, closing = high - low, (high_rate - low_rate) / (high - low)
+    dl = np.clip(x - low, gains.saturation * w, (1.0 - gains.saturation) * w)
+    du = w - dl
+    s = np.log(dl / du)
+    carried = (low_rate * du + high_rate * dl) / w - v
+    bent = (low_bend * du + high_bend * dl) / w
+    damping = k2 + k1 * (1.0 - s * (dl - du) / w) - closing
+    spring = s * dl * du / w * (k1 * k2 + k1 * closing + k1_rate)
+    law: FloatArray = damping * carried + bent - spring - gains.log_gain * w * s / (dl * du)
+    return law
+
+
+def _left(u: FloatArray | float) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return 1 - u^3 (10 - 15 u + 6 u^2), which is 0 from u = 1 on, and its derivatives by u."""
+    u = np.minimum(u, 1.0)
+    first, second = -30.0 * (u * (1.0 - u)) ** 2, -60.0 * u * (1.0 - 3.0 * u + 2.0 * u**2)
+    return 1.0 - u**3 * (10.0 - 15.0 * u + 6.0 * u**2), first, second
+
+
+def oscillator(stiffness: float, damping: float, time: float) -> FloatArray:
+    """Return the matrix that carries position and velocity of a damped oscillator, shape (2, 2).
+
+    Args:
+        stiffness: K [1/s^2].
+        damping: zeta [1/s].
+        time: T [s].
+    """
+    half = 0.5 * damping
+    root = sqrt(half * half - stiffness)
+    even, odd = cosh(root * time), sinh(root * time) / root if abs(root * time) > 1e-6 else time
+    rows = [[even + half * odd, odd], [-stiffness * odd, even - half * odd]]
+    matrix: FloatArray = (exp(-half * time) * np.array(rows)).real
+    return matrix
 
 
 # Delta E and the ready reports under a budget, computed again from nominal motions, which all robots share.
