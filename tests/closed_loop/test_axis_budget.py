@@ -14,7 +14,7 @@ from coop_drake.planning.planner import plan as make
 from coop_drake.plant import planning_problem, run_setup
 from coop_drake.scenario import ActuatorLimits, Deployment, Measurements, Messages
 from coop_drake.simulation import build_maps, simulate
-from coop_drake.verification.budgets import check_budget
+from coop_drake.verification.budget import check_budget
 from coop_drake.verification.runs import verify_log
 from coop_drake.verification.runs.budget import check_budget_used
 from coop_drake.verification.runs.laws import check_handovers, rest_shares

@@ -14,7 +14,7 @@ from coop_drake.plant.facts import budget_of
 from coop_drake.scenario import Deployment, Goal, ObjectPose, Start
 from coop_drake.simulation import build_maps, simulate
 from coop_drake.typed_data import convert_class
-from coop_drake.verification.budgets import check_budget
+from coop_drake.verification.budget import check_budget
 from coop_drake.verification.runs.budget import check_budget_used
 from coop_drake.verification.runs.rows import Rows
 from tests.support.small_scenario import small_scenario

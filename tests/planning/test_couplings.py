@@ -1,4 +1,4 @@
-"""What a team's masses couple: bounds over all joints of a cell, by the planner and by the verifier."""
+"""What a team's masses couple: bounds over all joints of a cell, against what Drake's models have there."""
 
 from functools import cache
 
@@ -20,9 +20,8 @@ from coop_drake.plant import base_chain, build_robot_plant, build_team_plant, ro
 from coop_drake.plant.component_tree import read_component_tree
 from coop_drake.plant.run_masses import base_frames, joint_inertias, moved_bodies
 from coop_drake.robustness import couplings as coupling
-from coop_drake.robustness.couplings import QUICKEST, cell_couplings, cell_efforts
+from coop_drake.robustness.couplings import cell_couplings, cell_efforts
 from coop_drake.scenario import load_scenario
-from coop_drake.verification.budgets.couplings import couplings, effort_shares
 from tests.support.ring_team import PRISMATIC, REVOLUTE, ring_team
 
 ARMS = [(REVOLUTE, PRISMATIC), (REVOLUTE,), (PRISMATIC, REVOLUTE)]
@@ -95,22 +94,6 @@ def test_bounds_hold_for_joints_of_all_kinds(ring):
     bounds, (rates, pushes) = cell_couplings(ring.budget, ring.tree, ring.cells), sampled(ring, 400)
     assert (rates <= bounds.rates[:, 1:]).all()
     assert (pushes <= np.sqrt((bounds.pushes[:, 1:] ** 2).sum(axis=(2, 3)))).all()
-
-
-@pytest.mark.parametrize("name", ["base", "elbow", "ring"])
-def test_the_verifier_finds_no_larger_ones_and_hardly_smaller_ones(name, ring):
-    case = ring if name == "ring" else shipped(name)
-    stated = cell_couplings(case.budget, case.tree, case.cells)
-    found = couplings(case.budget, case.tree, case.cells)
-    for ours, theirs in zip(stated, found, strict=True):
-        kinds = tuple(range(2, ours.ndim))
-        assert (theirs <= ours).all()
-        assert (theirs >= 0.8 * ours - 0.06 * ours.max(axis=kinds, keepdims=True)).all()
-    efforts = cell_efforts(case.budget, case.tree, case.cells)
-    room = np.full(len(case.cells), QUICKEST * case.budget.ahead)
-    for ours, theirs in zip(efforts, effort_shares(case.budget, case.tree, case.cells, room), strict=False):
-        assert (theirs <= ours + 1e-9).all()
-        assert (theirs >= 0.85 * ours - 0.06 * ours.max()).all()
 
 
 @pytest.mark.parametrize("name", ["base", "ring"])

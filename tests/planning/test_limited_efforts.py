@@ -14,7 +14,7 @@ from coop_drake.errors import RefusalError, ScenarioError
 from coop_drake.planning.planner import plan
 from coop_drake.plant.facts import budget_of
 from coop_drake.simulation import build_maps, simulate
-from coop_drake.verification.budgets import check_budget, check_efforts
+from coop_drake.verification.budget import check_budget, check_efforts
 from tests.support.scenarios import write_scenario
 
 QUIET = {"position_noise": 0.0003, "angle_noise": 0.0002, "rate_noise": 0.003}

@@ -27,9 +27,9 @@ from coop_drake.scenario import Deployment, load_scenario
 from coop_drake.scenario.model import RobotLimits
 from coop_drake.typed_data import convert_class, field_types
 from coop_drake.verification import answer as exact
+from coop_drake.verification import budget as budgets_checked
 from coop_drake.verification import verify_plan
-from coop_drake.verification.budgets import check as axes
-from coop_drake.verification.budgets import check_origin, position
+from coop_drake.verification.budget_origin import check_origin
 from coop_drake.verification.gains import check_ages
 from tests.support.certificates import GAINS, room_with_pillar
 from tests.support.last_cells import last_cells
@@ -134,7 +134,7 @@ FREE = {
 
 ADVICE = (
     "nothing refuses it. Let `verify` derive the number and compare it (coop_drake/verification: gains.py, "
-    "budgets/), or, if it is a free choice, check its inequality there and add it to FREE with "
+    "budget.py), or, if it is a free choice, check its inequality there and add it to FREE with "
     "factors that break the inequality"
 )
 
@@ -190,11 +190,11 @@ def once_each(monkeypatch):
         return known[key]
 
     monkeypatch.setattr(exact, "check", check)
-    monkeypatch.setattr(position, "position_bounds", POSITION_BOUNDS)
-    monkeypatch.setattr(axes, "loop_of", LOOP_OF)
+    monkeypatch.setattr(budgets_checked, "position_bounds", POSITION_BOUNDS)
+    monkeypatch.setattr(budgets_checked, "axis_loop", AXIS_LOOP)
 
 
-POSITION_BOUNDS, LOOP_OF = cache(position.position_bounds), cache(axes.loop_of)
+POSITION_BOUNDS, AXIS_LOOP = cache(budgets_checked.position_bounds), cache(budgets_checked.axis_loop)
 """Responses of the loops of a position and of axes, by their gains and their budget."""
 
 READ = ("target", "goal_lower", "goal_upper", "path", "neck", "length", "inradius")
