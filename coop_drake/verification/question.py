@@ -22,6 +22,7 @@ TRUSTED = (
     "the convex pieces, joints and pairs of bodies left aside that are read there, and their question "
     "(coop_drake/verification/question.py; --question FILE writes it)",
     "how a budget follows from the section deployment and the models (coop_drake/scenario, coop_drake/plant)",
+    "the bounds of what departs under a budget, which the planner uses too (coop_drake/robustness)",
     "the rule by which a plan's gains follow from its cells, which the planner uses too (coop_drake/laws)",
     "the simulation that estimates times, for limits that refuse a way (coop_drake/planning/duration.py)",
     "Python's integers, and the checker (coop_drake/checking)",
