@@ -10,7 +10,6 @@ rest of a sample depends only on departures before it, so that one pass forward 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from math import ceil
 from typing import NamedTuple
@@ -22,11 +21,8 @@ from coop_drake.laws.axis_table import (
     ACCELERATION_LIMIT,
     GOAL_LOWER,
     GOAL_UPPER,
-    LEAVING_TIME,
     LIMIT_GAIN,
     RATE_LIMIT,
-    REST_RATE,
-    REST_REACH,
     bounds_of,
 )
 from coop_drake.laws.nominal_axes import lag_factors
@@ -506,123 +502,6 @@ def comes_near_limit(row: FloatArray, sets: AxisSets) -> bool:
     if not limit < np.inf:
         return False
     return bool((rates * accelerations > 0.5 * row[LIMIT_GAIN] * (limit * limit - rates * rates)).any())
-
-
-EARLIER = 4
-"""By how many samples earlier a cell may be left than the tubes say: another approximation of the law gives
-tubes that come to rest up to 2 samples earlier."""
-
-LOWEST, HIGHEST = [0, 2], [1, 3, 4, 5]
-"""Which of the numbers of an entry set are lower bounds, and which upper ones."""
-
-
-def next_entry(row: FloatArray, sets: AxisSets, conditions: AxisConditions, report_periods: int) -> Entry:
-    """Return the set in which an axis can enter the next cell.
-
-    Its motion was at rest when a report was made; since then the time for which reports may be used has
-    passed, and a period. In that time it went no farther than its largest acceleration allows, and it has
-    stayed in its tube.
-
-    Args:
-        row: The axis in this cell, with the condition of rest under which the cell is left.
-        sets: Its sets.
-        conditions: How its motion is computed.
-        report_periods: How long a report may be used, in periods.
-    """
-    middle = 0.5 * (row[GOAL_LOWER] + row[GOAL_UPPER])
-    rest, since = (float(row[REST_REACH]), float(row[REST_RATE])), report_periods + 1
-    time = since * conditions.period
-    before = max(sets.last, *(float(tube[-1 - since :, ACCELERATION].max()) for tube in sets.tubes))
-    x, v = sets.settled, sets.settled_rate
-    bounds = np.array([middle - x, middle + x, -v, v, sets.last, before])
-    _limit(bounds, middle, rest, time)
-    leaving = ceil(row[LEAVING_TIME] / conditions.period - 1e-6)
-    for tube in sets.tubes:
-        found = _switching(tube, middle, rest, (since, leaving))
-        if found[0] <= found[1]:
-            _limit(found, middle, rest, time)
-            bounds[LOWEST] = np.minimum(bounds[LOWEST], found[LOWEST])
-            bounds[HIGHEST] = np.maximum(bounds[HIGHEST], found[HIGHEST])
-    low, high, slow, quick, pushed = bounds[:5].tolist()
-    return Entry(low, high, slow, quick, pushed, middle)
-
-
-def first_leaving(table: FloatArray, every: Sequence[AxisSets], period: float) -> int:
-    """Return the first sample at which all axes of a transition can have come to rest and its cell be left.
-
-    Args:
-        table: The axes, with the condition of rest under which the cell is left.
-        every: Their sets.
-        period: T [s].
-    """
-    stay: int = ceil(table[0, LEAVING_TIME] / period - 1e-6)
-    first = stay
-    for row, sets in zip(table, every, strict=True):
-        middle, rest = (
-            0.5 * (row[GOAL_LOWER] + row[GOAL_UPPER]),
-            (float(row[REST_REACH]), float(row[REST_RATE])),
-        )
-        first = max(first, min(_first_rest(tube, middle, rest, stay) for tube in sets.tubes))
-    return max(stay, first - EARLIER)
-
-
-@compiled(borrows=True)
-def _rests(sample: FloatArray, middle: float, rest: tuple[float, float]) -> bool:
-    """Return whether a motion can be at rest at a sample of a tube."""
-    near = abs(sample[X] - middle) <= rest[0] + sample[X_REACH]
-    return bool(near and abs(sample[V]) <= rest[1] + sample[V_REACH])
-
-
-@compiled(borrows=True)
-def _first_rest(tube: FloatArray, middle: float, rest: tuple[float, float], first: int) -> int:
-    """Return the first sample of a tube from another one on at which a motion can be at rest, or its end."""
-    for k in range(first, len(tube)):
-        if _rests(tube[k], middle, rest):
-            return k
-    return max(first, len(tube))
-
-
-@compiled(borrows=True)
-def _limit(bounds: FloatArray, middle: float, rest: tuple[float, float], time: float) -> None:
-    """Cut bounds of states to where a motion can be that was at rest some time ago."""
-    farther = rest[0] + time * (rest[1] + 0.5 * time * bounds[5])
-    faster = rest[1] + time * bounds[5]
-    bounds[0], bounds[1] = max(bounds[0], middle - farther), min(bounds[1], middle + farther)
-    bounds[2], bounds[3] = max(bounds[2], -faster), min(bounds[3], faster)
-
-
-@compiled
-def _switching(
-    tube: FloatArray, middle: float, rest: tuple[float, float], samples: tuple[int, int]
-) -> FloatArray:
-    """Return bounds of x and v, the largest |x''|, and that since the report, when a tube can be left.
-
-    The lowest x is above the highest one if it cannot be left before its end.
-
-    Args:
-        tube: The tube.
-        middle: Where the axis rests [rad or m].
-        rest: Distance and rate within which the axis counts as at rest [rad or m, rad/s or m/s].
-        samples: For how many samples a report may be used, and the first sample of a report.
-
-    Returns:
-        Shape (6,): lowest and highest x, lowest and highest v, the two accelerations.
-    """
-    since, leaving = samples
-    found = np.array([np.inf, -np.inf, np.inf, -np.inf, 0.0, 0.0])
-    reported = -since - 1
-    for k in range(leaving, len(tube)):
-        x, x_reach, v, v_reach = tube[k, X] - middle, tube[k, X_REACH], tube[k, V], tube[k, V_REACH]
-        if _rests(tube[k], middle, rest):
-            reported = k
-        if k - reported > since:
-            continue
-        found[0], found[1] = min(found[0], middle + x - x_reach), max(found[1], middle + x + x_reach)
-        found[2], found[3] = min(found[2], v - v_reach), max(found[3], v + v_reach)
-        found[4] = max(found[4], tube[k, ACCELERATION])
-        for i in range(max(k - since, leaving), k + 1):
-            found[5] = max(found[5], tube[i, ACCELERATION])
-    return found
 
 
 def even_sets(samples: int, acceleration: float, rate: float, period: float) -> AxisSets:
