@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from coop_drake.answers.axis_tracking import QUINTIC_FUNNELS
 from coop_drake.jit import compiled
 from coop_drake.laws.axis_table import (
     DECAY_RATE,
@@ -26,6 +27,9 @@ from coop_drake.laws.hand_over import fading
 from coop_drake.laws.ppc import ramped_gain, track_axis, track_distances
 from coop_drake.laws.slopes import gains_of, saturated, slope_bounds, slopes_between
 from coop_drake.tree.pose import FloatArray
+
+LAW = QUINTIC_FUNNELS
+"""Name and version of this law; a plan whose sets are for another one is refused."""
 
 LONG_AFTER = 100.0
 """Time at which gains are ramped in and funnels closed [s]."""

@@ -22,8 +22,7 @@ from coop_drake.robustness.nominal_axes import (
 from coop_drake.tree.pose import FloatArray
 
 EARLIER = 4
-"""By how many samples earlier a cell may be left than the tubes say [-]: numbers that machines round otherwise
-move a rest by far less."""
+"""By how many samples earlier a cell may be left than the tubes say [-]: rounding moves rests by far less."""
 
 LOWEST, HIGHEST = [0, 2], [1, 3, 4, 5]
 """Which of the numbers of an entry set are lower bounds, and which upper ones."""

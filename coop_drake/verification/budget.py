@@ -49,6 +49,7 @@ from coop_drake.robustness.efforts import (
     single_noise,
     transition_efforts,
 )
+from coop_drake.robustness.funnel_law import LAW
 from coop_drake.robustness.leaving import first_leaving, next_entry
 from coop_drake.robustness.nominal_axes import (
     AxisConditions,
@@ -121,6 +122,8 @@ def _tracking(plan: Plan, budget: Budget) -> AxisTracking:
     tracking = plan.axis_tracking
     if tracking is None:
         raise RefusalError("axis_tracking", "is missing, but the plan has a budget")
+    if tracking.law != LAW:
+        raise RefusalError("axis_tracking.law", f"is {tracking.law!r}; sets are checked for {LAW!r}")
     axes = plan.start.size - 2
     timed = axes if budget.clock_error or budget.joint_viscous else 0
     needed = {"rate": timed, "acceleration": timed, "disturbance": 1 + axes if budget.rubs else 0}
