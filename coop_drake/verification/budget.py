@@ -63,8 +63,8 @@ from coop_drake.tree import ComponentTree
 from coop_drake.tree.pose import FloatArray
 from coop_drake.verification.checks import Check
 
-ROUNDING = 1e-9
-"""Differences that rounding explains, relative and absolute [rad or m, s]."""
+ROUNDING, LEAST = 1e-9, 1e-12
+"""Differences that rounding explains, relative [-] and absolute [rad or m, and per second]."""
 
 
 def check_budget(plan: Plan, tree: ComponentTree | None = None) -> Check | None:
@@ -248,7 +248,7 @@ def _check_departures(plan: Plan, k: int, table: FloatArray, every: list[AxisSet
 
 def _require(stated: FloatArray, found: FloatArray, least: bool, where: str) -> None:
     """Refuse a stated bound that the found values exceed; ``least`` says that it is a lower one."""
-    room = ROUNDING * (1.0 + np.abs(found))
+    room = ROUNDING * np.abs(found) + LEAST
     good = stated <= found + room if least else stated >= found - room
     if not good.all():
         axis, side = int(np.argmin(good)), "down" if least else "up"
