@@ -267,6 +267,10 @@ class PositionTube:
 # The axes' part of a budget: with which gains angles and joints are pulled to their nominal motions.
 
 
+QUINTIC_FUNNELS = "quintic funnels, version 1"
+"""The law of nominal axes for which sets are stated and checked, with the version of its formulas."""
+
+
 @dataclass(frozen=True)
 class AxisTracking:
     """Gains of the pull, the same for all axes and in every transition of a plan.
@@ -280,6 +284,7 @@ class AxisTracking:
         acceleration: The same of its acceleration [rad/s^2 or m/s^2].
         disturbance: Of the object's origin, then of every axis, the largest acceleration that friction of
             joints causes; empty where there is none [m/s^2, rad/s^2 or m/s^2].
+        law: Name and version of the law that commands nominal axes; the sets hold for this one.
     """
 
     stiffness: Bound
@@ -287,6 +292,7 @@ class AxisTracking:
     rate: tuple[Bound, ...] = ()
     acceleration: tuple[Bound, ...] = ()
     disturbance: tuple[_Exact, ...] = ()
+    law: str = QUINTIC_FUNNELS
 
 
 # The levels above which a measured departure from the nominal motion is an alarm.

@@ -29,8 +29,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from coop_drake.answers.axis_tracking import AxisTracking
-from coop_drake.answers.budget import Budget
+from coop_drake.answers.budget import AxisTracking, Budget
 from coop_drake.jit import compiled
 from coop_drake.laws.nominal_axes import lag_factors
 from coop_drake.laws.sampling import whole_periods

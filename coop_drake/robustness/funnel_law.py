@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from coop_drake.answers.axis_tracking import QUINTIC_FUNNELS
+from coop_drake.answers.budget import QUINTIC_FUNNELS
 from coop_drake.jit import compiled
 from coop_drake.laws.axis_table import (
     DECAY_RATE,

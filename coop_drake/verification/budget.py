@@ -15,11 +15,8 @@ import numpy as np
 import shapely
 from shapely import LineString, Point
 
-from coop_drake.answers.alarms import Alarms
-from coop_drake.answers.axis_tracking import AxisTracking
-from coop_drake.answers.budget import LIMITS, Budget, Tolerance
+from coop_drake.answers.budget import LIMITS, Alarms, AxisTracking, Budget, PositionTube, Tolerance
 from coop_drake.answers.plan import Plan
-from coop_drake.answers.position_tube import PositionTube
 from coop_drake.errors import RefusalError
 from coop_drake.laws.axis_table import RATE_LIMIT, axis_table
 from coop_drake.laws.readiness import EROSION, RATE_TOLERANCE

@@ -9,10 +9,9 @@ from math import inf
 
 import numpy as np
 
-from coop_drake.answers.budget import AxisTracking, Budget, Tolerance
+from coop_drake.answers.budget import AxisTracking, Budget, Restart, Tolerance
 from coop_drake.answers.plan import Plan, Transition
 from coop_drake.answers.problem import PlanningProblem
-from coop_drake.answers.restart import Restart
 from coop_drake.laws import ScheduledGains
 from coop_drake.laws.axis_table import (
     ACCELERATION_LIMIT,
