@@ -154,7 +154,7 @@ def case(name, required):
         departures = {"preset": "mobile_base", "budget": "all", "actuators": EFFORTS}
         departures |= {"clock_error": 1e-4} if name == CLOCKS else {}
         departures |= {"joint_friction": FRICTION} if name == RUBBING else {}
-        deployed = Deployment.completed(departures, "deployment")
+        deployed = Deployment.completed(departures)
         scenario = replace(scenario, deployment=convert_class(deployed, Deployment))
     problem, gains = planning_problem(scenario), scenario.gain_sets
     budget = budget_of(None, scenario, problem)
