@@ -100,7 +100,7 @@ def read_plan(task: Task, path: Path, reporter: Reporter, *, new_gains: bool = F
     from coop_drake.answers import load_plan
     from coop_drake.answers.plan_file import check_plan_belongs, other_age
     from coop_drake.planning import reschedule
-    from coop_drake.plant.budgets import scenario_budgets
+    from coop_drake.plant.facts import scenario_budgets
     from coop_drake.verification.budget_origin import check_origin
 
     found = load_plan(path)

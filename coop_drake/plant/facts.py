@@ -25,7 +25,7 @@ from coop_drake.scenario.budget_file import ALL, POSITION, TeamMasses, read_budg
 from coop_drake.tree.component_tree import Bodies, ComponentTree
 from coop_drake.tree.pose import FloatArray
 from coop_drake.typed_data import to_plain
-from coop_drake.verification.budgets import Facts, OwnBudgets, ScenarioBudgets, wrong_facts
+from coop_drake.verification.budget_origin import Facts, OwnBudgets, ScenarioBudgets, wrong_facts
 from coop_drake.verification.runs import BodyMass, RunSetup
 
 # Digests of a scenario and its models: which scenario a log belongs to, and what processes must agree on.

@@ -1,6 +1,6 @@
 """How far an axis may depart from its nominal motion under a budget.
 
-Let e = x - x^ be the departure of an axis from its nominal motion, see ``laws/nominal_axes.py``. Robots
+Let e = x - x^ be the departure of an axis from its nominal motion, see ``laws/nominal.py``. Robots
 command, at sample k and with measurements that are m periods old, L + q_k with the pull
 
     q_k = -K_a (e_(k-m) + n_x) - zeta_a (e'_(k-m) + n_v),
@@ -31,8 +31,8 @@ import numpy as np
 
 from coop_drake.answers.budget import AxisTracking, Budget
 from coop_drake.jit import compiled
-from coop_drake.laws.nominal_axes import lag_factors
-from coop_drake.laws.sampling import whole_periods
+from coop_drake.laws.measurements import whole_periods
+from coop_drake.laws.nominal import lag_factors
 from coop_drake.robustness.alarms import axis_errors, mistaken
 from coop_drake.robustness.nominal_axes import AxisSets, even_sets
 from coop_drake.tree.pose import FloatArray

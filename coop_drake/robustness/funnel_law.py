@@ -20,12 +20,13 @@ from coop_drake.laws.axis_table import (
     RATE_GAIN,
     SATURATION,
     bounds_of,
+    gains_of,
+    saturated,
+    slope_bounds,
+    slopes_between,
     track_row,
 )
-from coop_drake.laws.funnels import CLOSING
-from coop_drake.laws.hand_over import fading
-from coop_drake.laws.ppc import ramped_gain, track_axis, track_distances
-from coop_drake.laws.slopes import gains_of, saturated, slope_bounds, slopes_between
+from coop_drake.laws.ppc import CLOSING, fading, ramped_gain, track_axis, track_distances
 from coop_drake.tree.pose import FloatArray
 
 LAW = QUINTIC_FUNNELS

@@ -25,7 +25,7 @@ from coop_drake.laws.axis_table import (
     RATE_LIMIT,
     bounds_of,
 )
-from coop_drake.laws.nominal_axes import lag_factors
+from coop_drake.laws.nominal import lag_factors
 from coop_drake.robustness.funnel_law import (
     closed_after,
     command_near,

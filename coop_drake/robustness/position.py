@@ -12,7 +12,7 @@ from scipy.linalg import expm
 
 from coop_drake.answers.budget import Budget, PositionTube
 from coop_drake.jit import compiled
-from coop_drake.laws.sampling import whole_periods
+from coop_drake.laws.measurements import whole_periods
 from coop_drake.robustness.alarms import unseen_of
 from coop_drake.tree.pose import FloatArray
 

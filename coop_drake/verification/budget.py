@@ -19,8 +19,8 @@ from coop_drake.answers.budget import LIMITS, Alarms, AxisTracking, Budget, Posi
 from coop_drake.answers.plan import Plan
 from coop_drake.errors import RefusalError
 from coop_drake.laws.axis_table import RATE_LIMIT, axis_table
+from coop_drake.laws.measurements import whole_periods
 from coop_drake.laws.readiness import EROSION, RATE_TOLERANCE
-from coop_drake.laws.sampling import whole_periods
 from coop_drake.robustness.alarms import alarms_of, axis_noises, axis_reserve, position_room, rubbed
 from coop_drake.robustness.axis_departure import (
     HORIZON,

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from coop_drake.answers.budget import AxisTracking, Budget
-from coop_drake.laws.sampling import whole_periods
+from coop_drake.laws.measurements import whole_periods
 from coop_drake.robustness.axis_departure import axis_loop
 from coop_drake.scenario import Deployment, Measurements
 

@@ -7,8 +7,8 @@ import pytest
 
 from coop_drake.laws import Funnel, ScheduledGains, transition_gains
 from coop_drake.laws.axis_table import FADING_TIME, axis_table, bounds_of, track_row
-from coop_drake.laws.hand_over import fading
-from coop_drake.laws.nominal_axes import carry_axes
+from coop_drake.laws.nominal import carry_axes
+from coop_drake.laws.ppc import fading
 from coop_drake.robustness.funnel_law import fit_law, law_memory
 from coop_drake.robustness.nominal_axes import (
     DISTANCE,

@@ -4,21 +4,18 @@ from functools import cache
 
 import numpy as np
 import pytest
+from coop_drake.plant.run_masses import base_frames, joint_inertias, moved_bodies
 from pydrake.systems.framework import DiagramBuilder
 from shapely import box
 
 from coop_drake.answers.budget import Budget
 from coop_drake.answers.plan import Cell
 from coop_drake.diagram.robot_controller import RobotKnowledge
-from coop_drake.laws.chain_motion import motion_room
-from coop_drake.laws.disagreement import disagreement_coupling
-from coop_drake.laws.load_sharing import end_effector_command
-from coop_drake.laws.nominal_axes import place_on_axes
-from coop_drake.laws.rate_terms import rate_terms
-from coop_drake.laws.robot_dynamics import robot_effort
+from coop_drake.laws.couplings import disagreement_coupling, rate_terms
+from coop_drake.laws.nominal import place_on_axes
+from coop_drake.laws.robot_dynamics import end_effector_command, motion_room, robot_effort
 from coop_drake.plant import base_chain, build_robot_plant, build_team_plant, robot_chain
 from coop_drake.plant.component_tree import read_component_tree
-from coop_drake.plant.run_masses import base_frames, joint_inertias, moved_bodies
 from coop_drake.robustness import couplings as coupling
 from coop_drake.robustness.couplings import cell_couplings, cell_efforts
 from coop_drake.scenario import load_scenario

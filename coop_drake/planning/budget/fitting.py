@@ -13,6 +13,7 @@ from coop_drake.answers.budget import AxisTracking, Budget, Restart, Tolerance
 from coop_drake.answers.plan import Plan, Transition
 from coop_drake.answers.problem import PlanningProblem
 from coop_drake.laws import ScheduledGains
+from coop_drake.laws.actuators import ACCELERATION, RATE
 from coop_drake.laws.axis_table import (
     ACCELERATION_LIMIT,
     GOAL_LOWER,
@@ -23,10 +24,9 @@ from coop_drake.laws.axis_table import (
     REST_REACH,
     axis_table,
 )
-from coop_drake.laws.beginning import ACCELERATION, RATE
 from coop_drake.laws.gains import IDEAL_AGE, RestCondition
+from coop_drake.laws.measurements import whole_periods
 from coop_drake.laws.readiness import EROSION, RATE_TOLERANCE
-from coop_drake.laws.sampling import whole_periods
 from coop_drake.planning.transitions import share_speeds, with_gains
 from coop_drake.robustness.alarms import axis_noises, least_distance
 from coop_drake.robustness.axis_departure import (
@@ -499,7 +499,7 @@ def best_loop(budget: Budget, disturbance: tuple[float, ...] = (), weight: float
 
 
 # How far axes depart where a team begins a cell anew from rest, see ``answers/restart.py``. On the slow way
-# of ``laws/beginning.py`` every axis has at most a rate and an acceleration that are the same in all cells.
+# of ``laws/actuators.py`` every axis has at most a rate and an acceleration that are the same in all cells.
 # The departures follow as in a transition, from a rest with constant errors: before it and at all samples
 # that are still to be used, what was measured is where the nominal motion is. An axis that is taken for
 # resting may have a small rate still: what this causes is added, by superposition.
