@@ -4,7 +4,6 @@ from functools import cache
 
 import numpy as np
 import pytest
-from coop_drake.plant.run_masses import base_frames, joint_inertias, moved_bodies
 from pydrake.systems.framework import DiagramBuilder
 from shapely import box
 
@@ -16,6 +15,7 @@ from coop_drake.laws.nominal import place_on_axes
 from coop_drake.laws.robot_dynamics import end_effector_command, motion_room, robot_effort
 from coop_drake.plant import base_chain, build_robot_plant, build_team_plant, robot_chain
 from coop_drake.plant.component_tree import read_component_tree
+from coop_drake.plant.facts import base_frames, joint_inertias, moved_bodies
 from coop_drake.robustness import couplings as coupling
 from coop_drake.robustness.couplings import cell_couplings, cell_efforts
 from coop_drake.scenario import load_scenario

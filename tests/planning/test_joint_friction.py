@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from coop_drake.plant.budgets import budget_of, scenario_budgets
 
 from coop_drake.answers import Found
 from coop_drake.answers.budget import Budget
@@ -15,6 +14,7 @@ from coop_drake.laws.team_dynamics import team_accelerations, team_chain, team_w
 from coop_drake.planning.budget.fitting import UnprovedTransition, fit_budget
 from coop_drake.planning.planner import plan
 from coop_drake.plant import planning_problem
+from coop_drake.plant.facts import budget_of, scenario_budgets
 from coop_drake.robustness.axis_departure import axis_loop
 from coop_drake.scenario import Deployment, JointFriction, load_scenario
 from coop_drake.simulation import build_maps
