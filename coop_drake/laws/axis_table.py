@@ -90,16 +90,6 @@ def bounds_of(row: FloatArray, time: float) -> tuple[float, float, float, float,
 
 
 @compiled(borrows=True)
-def law_at(
-    row: FloatArray, time: float, pace: float, pace_rate: float
-) -> tuple[tuple[float, float, float, float, float, float], tuple[float, float, float, float, float]]:
-    """Return the bounds and the gains that ``track_axis`` takes; arguments as in ``track_paced_row``."""
-    k1, k1_dot = ramped_gain(time, row[POSITION_GAIN], row[RAMP_RATE])
-    gains = row[LOG_GAIN], k1, k1_dot * pace, row[RATE_GAIN], row[SATURATION]
-    return slowed_bounds(bounds_of(row, time), pace, pace_rate), gains
-
-
-@compiled(borrows=True)
 def track_row(row: FloatArray, time: float, position: float, rate: float) -> tuple[float, float]:
     """Return ``track_axis`` of one axis from its row.
 
@@ -126,8 +116,9 @@ def track_paced_row(
         position: x [rad or m].
         rate: x' [rad/s or m/s].
     """
-    bounds, gains = law_at(row, time, pace, pace_rate)
-    return track_axis(position, rate, bounds, gains)
+    k1, k1_dot = ramped_gain(time, row[POSITION_GAIN], row[RAMP_RATE])
+    gains = row[LOG_GAIN], k1, k1_dot * pace, row[RATE_GAIN], row[SATURATION]
+    return track_axis(position, rate, slowed_bounds(bounds_of(row, time), pace, pace_rate), gains)
 
 
 def funnel_acceleration(

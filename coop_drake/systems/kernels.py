@@ -60,32 +60,6 @@ def cell_margin(
 
 
 @compiled(borrows=True)
-def accelerate_object(
-    gains: tuple[float, float, float],
-    speed_limit: float,
-    object_state: FloatArray,
-    governor_position: FloatArray,
-    acceleration: FloatArray,
-) -> None:
-    """Write ``governed_acceleration`` of both coordinates with the damping that keeps the speed limit.
-
-    The rate at which the speed may approach its limit is zeta.
-
-    Args:
-        gains: K, zeta and K_G now.
-        speed_limit: Largest speed of the object's origin, infinity for none [m/s].
-        object_state: Pose and twist of the object, shape (6,).
-        governor_position: p_G, shape (2,) [m].
-        acceleration: Receives both coordinates, shape (2,) [m/s^2].
-    """
-    vx, vy = object_state[3], object_state[4]
-    ax = governed_acceleration(object_state[0], vx, governor_position[0], gains[0], gains[1])
-    ay = governed_acceleration(object_state[1], vy, governor_position[1], gains[0], gains[1])
-    damping = speed_damping(ax * vx + ay * vy, vx * vx + vy * vy, speed_limit, gains[1])
-    acceleration[0], acceleration[1] = ax - damping * vx, ay - damping * vy
-
-
-@compiled(borrows=True)
 def govern(
     row: FloatArray,
     edges: FloatArray,
@@ -112,7 +86,12 @@ def govern(
         Delta E [m^2/s^2].
     """
     gains, limit = governed_gains(row, time), row[SPEED_LIMIT]
-    accelerate_object(gains, limit, object_state, governor_position, command[2:])
+    # The desired acceleration, damped near the speed limit, which the speed may approach at the rate zeta.
+    vx, vy = object_state[3], object_state[4]
+    ax = governed_acceleration(object_state[0], vx, governor_position[0], gains[0], gains[1])
+    ay = governed_acceleration(object_state[1], vy, governor_position[1], gains[0], gains[1])
+    damping = speed_damping(ax * vx + ay * vy, vx * vx + vy * vy, limit, gains[1])
+    command[2], command[3] = ax - damping * vx, ay - damping * vy
     clearance = signed_distance(edges, governor_position[0], governor_position[1])
     margin = object_energy_margin(object_state, governor_position, clearance, gains[0])
     driving = driving_margin(margin, clearance, steady_clearance(limit, *gains), gains[0])
