@@ -41,7 +41,7 @@ from benchmarks.simulating import simulating_tasks
 from benchmarks.study import Study, batches_of, load_study, make_study, show_results
 from benchmarks.table import TOPICS, WHOLE, show, show_contents
 from benchmarks.tasks import Task, chosen, worked
-from coop_drake.campaign.results import CampaignFolder
+from coop_drake.campaign.records import CampaignFolder
 from coop_drake.cli.reporter import ExitCode, reporting
 from coop_drake.errors import ScenarioError
 

@@ -13,12 +13,10 @@ from benchmarks.isolated import WorkerError, in_own_process
 from benchmarks.rows import Row
 from benchmarks.tasks import Task
 from coop_drake.campaign import load_campaign
-from coop_drake.campaign.batches import Batch, Batching
+from coop_drake.campaign.execution import Order, client_of, make_batch, run_campaign
+from coop_drake.campaign.file import Tier
 from coop_drake.campaign.plans import Plans
-from coop_drake.campaign.results import CampaignFolder
-from coop_drake.campaign.running import Order, make_batch, run_campaign
-from coop_drake.campaign.running.placing import client_of
-from coop_drake.campaign.settings import Tier
+from coop_drake.campaign.records import Batch, Batching, CampaignFolder
 from coop_drake.campaign.variation import Variation
 
 __all__ = ["campaign_tasks", "placing", "worker_memory"]

@@ -19,8 +19,8 @@ from benchmarks.deployed import TEAMS
 from benchmarks.rows import Row
 from benchmarks.tasks import Task
 from coop_drake import Found, build_maps, load_scenario, plan
-from coop_drake.campaign.measuring import record_of_log
 from coop_drake.campaign.records import RunRecord, table_of
+from coop_drake.campaign.runs import record_of_log
 from coop_drake.campaign.variation import Run
 from coop_drake.compiled_loop import CompiledTransport, prepare, run
 from coop_drake.compiling import COMPILING

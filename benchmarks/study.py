@@ -35,9 +35,8 @@ from benchmarks.searches.searching import (
     search_batches,
     section_of,
 )
-from coop_drake.campaign.batches import Batch
-from coop_drake.campaign.results import CampaignFolder
-from coop_drake.campaign.running.command import Outcome, make_batches
+from coop_drake.campaign.execution import Outcome, make_batches
+from coop_drake.campaign.records import Batch, CampaignFolder
 from coop_drake.cli.reporter import ExitCode, Reporter
 from coop_drake.errors import ScenarioError
 from coop_drake.files import write_atomically

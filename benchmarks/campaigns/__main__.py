@@ -17,11 +17,9 @@ import typer
 
 from benchmarks import study
 from coop_drake.campaign import load_campaign
-from coop_drake.campaign.report import Report, make_report
-from coop_drake.campaign.report.columns import MARGINS, SHARE
-from coop_drake.campaign.report.rates import percent, percent_up
-from coop_drake.campaign.results import CampaignFolder
-from coop_drake.campaign.running.command import batches_of
+from coop_drake.campaign.execution import batches_of
+from coop_drake.campaign.records import CampaignFolder
+from coop_drake.campaign.report import MARGINS, SHARE, Report, make_report, percent, percent_up
 
 NAMES = ("breaking", "searches", "questions", "inside_budgets", "drake_inside_budgets")
 """The campaigns in the order in which they are made: what takes longest comes last."""

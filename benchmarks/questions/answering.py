@@ -31,9 +31,8 @@ from coop_drake.answers import (
 )
 from coop_drake.answers.digest import content_digest
 from coop_drake.answers.plan import SearchReport
-from coop_drake.campaign.batches import Batch, Task, Work
 from coop_drake.campaign.plans import versions
-from coop_drake.campaign.results import CampaignFolder
+from coop_drake.campaign.records import Batch, CampaignFolder, Task, Work
 from coop_drake.errors import PatienceError, RefusalError
 from coop_drake.files import write_atomically
 from coop_drake.planning import warm_up

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated, Literal
 
-from coop_drake.campaign.keys import Seed
+from coop_drake.campaign.file import Seed
 from coop_drake.typed_data import DataError, Limits, NotNegative, Positive
 
 FloorKind = Literal["room", "corridor", "door", "warehouse", "rooms"]

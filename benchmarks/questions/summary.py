@@ -12,8 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.questions.answering import QuestionRecord
-from coop_drake.campaign.report.columns import significant
-from coop_drake.campaign.report.distributions import NOTHING, Distribution, distribution
+from coop_drake.campaign.report import NOTHING, Distribution, distribution, significant
 
 ALL = "all"
 """Name of the group of all questions."""

@@ -8,7 +8,7 @@ from math import isfinite, isnan, nan
 
 import numpy as np
 
-from coop_drake.campaign.report.rates import percent
+from coop_drake.campaign.report import percent
 
 
 @dataclass(frozen=True)

@@ -18,14 +18,10 @@ from benchmarks.searches.departures import SCALED, BoundedDepartures, departures
 from benchmarks.searches.findings import BreakingPoint, Finding
 from coop_drake.answers.budget import Budget
 from coop_drake.answers.digest import content_digest
-from coop_drake.campaign.batches import Batch, Task, Work
-from coop_drake.campaign.distributions import Count
-from coop_drake.campaign.keys import LARGEST_SEED, Plain, Seed, check_keys
+from coop_drake.campaign.file import LARGEST_SEED, Campaign, Count, Plain, Runs, Seed, check_keys
 from coop_drake.campaign.plans import Plans, versions
-from coop_drake.campaign.records import RunRecord
-from coop_drake.campaign.results import CampaignFolder
-from coop_drake.campaign.running.making import RunMaker, check_unchanged
-from coop_drake.campaign.settings import Campaign, Runs
+from coop_drake.campaign.records import Batch, CampaignFolder, RunRecord, Task, Work
+from coop_drake.campaign.runs import RunMaker, check_unchanged
 from coop_drake.campaign.variation import Run, Variation
 from coop_drake.errors import ScenarioError
 from coop_drake.files import write_atomically

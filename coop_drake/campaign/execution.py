@@ -1,35 +1,74 @@
-"""Has the runs of a batch made by a disposable process, and writes their records."""
+"""Runs a campaign from its file to its results, or the rest of one that was interrupted, by Dask.
+
+A batch is a task of Dask, on a cluster of this machine alone or on one that exists. A worker that hangs is
+ended by the alarm of the system, one that takes too much memory by its nanny; the nanny starts another one,
+and Dask gives it the batch again. A run at which several workers were lost counts as lost; the others are
+made.
+"""
 
 from __future__ import annotations
 
-import json
+import fcntl
+import logging
 import os
-import selectors
+import shutil
 import signal
-import subprocess
-import sys
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import asdict, dataclass, replace
+from itertools import islice
 from pathlib import Path
-from typing import IO, Any
+from pkgutil import resolve_name
+from threading import Lock
+from time import process_time
+from typing import TYPE_CHECKING, cast
 
-from coop_drake.campaign.batches import Batch
-from coop_drake.campaign.plans import source_digest
-from coop_drake.campaign.records import Record
-from coop_drake.campaign.results import CampaignFolder
-from coop_drake.errors import ProcessError
+from coop_drake.campaign.file import Campaign, Tier
+from coop_drake.campaign.plans import Plans, source_digest
+from coop_drake.campaign.records import Batch, Batching, CampaignFolder, Record, work_of
+from coop_drake.campaign.runs import RunMaker
+from coop_drake.campaign.variation import Variation
+from coop_drake.errors import ProcessError, ScenarioError
+from coop_drake.files import write_atomically
+from coop_drake.interrupts import ended_by_signals, uninterrupted
+from coop_drake.memory import peak_memory_mb
+from coop_drake.progress import Progress
+
+if TYPE_CHECKING:
+    from distributed import Client
 
 _ATTEMPTS = 3
-"""How many processes try a run before it counts as lost: one may be killed, or starve, by no fault of it."""
+"""How many workers try a run before it counts as lost: one may be killed, or starve, by no fault of it."""
 
 _START = 600.0
-"""How much longer a process may take until its first run has ended [s]: it reads models and maps, and may
-have to compile all kernels, on a busy machine."""
+"""How much longer a worker may take until its first run has ended [s]: it reads models and maps, and may have
+to compile all kernels, on a busy machine."""
 
+_WAITING = 1000
+"""Batches that the scheduler holds at a time: it keeps some kilobytes of each."""
 
-_COMMAND = (sys.executable, "-m", "coop_drake.campaign.running.child")
-"""Starts a process that makes runs; what it shall make is one more argument."""
+_PORTS = 2**16
+"""Ports have smaller numbers."""
+
+_SETTINGS = {
+    "distributed": {
+        "scheduler": {"allowed-failures": 100, "worker-ttl": "30s"},
+        "worker": {
+            "profile": {"enabled": False},
+            "memory": {"target": False, "spill": False, "pause": False, "terminate": 0.95},
+        },
+        "admin": {"tick": {"interval": "500ms"}, "system-monitor": {"interval": "5s"}},
+    }
+}
+"""A batch is tried again when its worker was lost, and given to another worker after a minute at most in
+which its own was silent: Dask looks every half minute which workers have been silent for as long. Drake keeps
+17 MB of a hundred runs: a worker that has no memory left is ended and another one started. Dask's
+measurements of itself are off or rare: scheduler and two workers would use a seventh of a core for them. The
+user's own settings in Dask's configuration stand above these where they differ from Dask's defaults."""
+
+_ONE_BATCH = Lock()
+"""Held while this process makes a batch: it has one alarm."""
 
 
 @dataclass(frozen=True)
@@ -49,118 +88,259 @@ class Order:
     time_limit: float
 
 
-class _LostError(Exception):
-    """A process ended, or was ended, before it was done; with the record of the run it was at, if any."""
+@dataclass(frozen=True)
+class Outcome:
+    """What a campaign has come to.
 
-    def __init__(self, reason: str, begun: Record | None) -> None:
-        super().__init__(reason)
-        self.begun = begun
+    Attributes:
+        folder: Where its results are.
+        batches: All of its batches.
+        made: How many of them this call has made; the others were there.
+    """
+
+    folder: CampaignFolder
+    batches: tuple[Batch, ...]
+    made: int
 
 
 def make_batch(order: Order) -> bool:
     """Make a batch, unless its file is there; return whether it was made.
 
-    A run at which several processes were lost is recorded as lost; the others are made all the same.
+    The system ends this process if a run takes longer than the order allows. Before a run is made, its index
+    is written to a file: who makes the batch again knows at which runs others were lost.
 
     Raises:
-        ProcessError: No process can start, or what it is to make has changed.
+        CoopDrakeError: What the batch is made from has changed.
         OSError: The records cannot be written.
     """
     folder, batch = CampaignFolder(Path(order.folder)), order.batch
-    if folder.has(batch):
-        return False
-    records: list[Record] = []
-    costs: dict[str, Any] = {"runs": batch.stop - batch.first, "cpu_seconds": 0.0, "peak_memory_mb": 0.0}
-    costs |= {"lost_processes": 0, "sources": source_digest()}
-    failures = 0
-    while len(records) < batch.stop - batch.first:
+    with _ONE_BATCH:
+        if folder.has(batch):
+            return False
+        trace = folder.path / "attempts" / batch.digest
+        trace.parent.mkdir(parents=True, exist_ok=True)
+        lost = [int(line) for line in trace.read_text().split()] if trace.exists() else []
+        sources, begin = source_digest(), process_time()
+        records: list[Record] = []
+
+        def alive() -> None:
+            signal.setitimer(signal.ITIMER_REAL, order.time_limit)
+
+        signal.setitimer(signal.ITIMER_REAL, order.time_limit + _START)
         try:
-            for kind, content in _lines(order, batch.first + len(records)):
-                if kind == "ended":
-                    records.append(batch.record(**content))
-                    failures = 0
-                else:
-                    costs["cpu_seconds"] += content["cpu_seconds"]
-                    costs["peak_memory_mb"] = max(costs["peak_memory_mb"], content["peak_memory_mb"])
-                    costs["sources"] = content["sources"]
-        except _LostError as lost:
-            failures += 1
-            costs["lost_processes"] += 1
-            if failures < _ATTEMPTS:
-                continue
-            if lost.begun is None:
-                raise ProcessError(f"no process for runs could start: {lost}") from lost
-            records.append(replace(lost.begun, reason=str(lost)))
-            failures = 0
-    folder.write(batch, records)
-    folder.note(batch, costs)
+            tasks = resolve_name(work_of(batch.work).tasks)
+            for begun, make in tasks({**asdict(order), "begin": batch.first}, alive):
+                index = batch.first + len(records)
+                if lost.count(index) >= _ATTEMPTS:
+                    within = f"no result within {order.time_limit:g} s, or the process was ended"
+                    records.append(replace(begun, reason=f"{within}, {_ATTEMPTS} times"))
+                    continue
+                trace.write_text("\n".join(map(str, [*lost, index])))
+                records.append(make())
+                alive()
+        finally:
+            signal.setitimer(signal.ITIMER_REAL, 0.0)
+        folder.write(batch, records)
+        costs = {"runs": len(records), "cpu_seconds": process_time() - begin, "sources": sources}
+        folder.note(batch, {**costs, "peak_memory_mb": peak_memory_mb(), "lost_processes": len(lost)})
+        trace.unlink(missing_ok=True)
     return True
 
 
-def _lines(order: Order, begin: int) -> Iterator[tuple[str, Any]]:
-    """Yield what a process says of the runs from an index on: ``ended`` and ``costs`` with their content.
+def batches_of(campaign: Campaign, folder: CampaignFolder) -> tuple[Batch, ...]:
+    """Return the batches of a campaign, after a check of all that varies.
 
     Raises:
-        _LostError: It ended before it was done, or took too long, and was ended.
-        ProcessError: It says that it cannot run what it was told.
+        ScenarioError: The campaign file or a scenario is wrong.
     """
-    begun: Record | None = None
-    pipe = subprocess.PIPE
-    with (
-        tempfile.TemporaryFile() as errors,
-        tempfile.TemporaryDirectory() as scratch,  # A process that is killed leaves files in it.
-        subprocess.Popen(
-            [*_COMMAND, json.dumps({**asdict(order), "begin": begin, "scratch": scratch})],
-            stdin=pipe,
-            stdout=pipe,
-            stderr=errors,
-            env={**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))},  # It finds the same.
-        ) as process,
-    ):
-        assert process.stdout is not None  # it is a pipe
+    variation = Variation(campaign)
+    variation.check()
+    return tuple(Batching(variation, Plans(variation, folder.plans)).batches())
+
+
+def run_campaign(
+    campaign: Campaign,
+    out: Path,
+    *,
+    workers: int | None = None,
+    scheduler: str | None = None,
+    progress: Progress | None = None,
+) -> Outcome:
+    """Make all runs of a campaign whose results are not there yet.
+
+    Args:
+        campaign: The campaign.
+        out: The folder of its results; every worker must see it under this name.
+        workers: How many batches are made at a time on this machine; one a core by default.
+        scheduler: Address of a Dask scheduler that exists, in place of workers on this machine.
+        progress: Called with what is done and the fraction of it.
+
+    Raises:
+        ScenarioError: The file or a scenario is wrong, or another command works in the folder.
+        PlanError: There is no plan for a scenario.
+        ProcessError: Workers were lost for good; the same call goes on from there.
+        OSError: Results cannot be written.
+    """
+    folder = CampaignFolder(out.absolute())
+
+    def prepare(missing: Sequence[Batch]) -> None:
+        """Make the plans, which workers find in the folder, and check the runs."""
+        variation = Variation(campaign)
+        plans = Plans(variation, folder.plans)
+        for tier, scenario in dict.fromkeys((batch.tier, batch.scenario) for batch in missing):
+            plans.with_maps(variation.run(scenario * variation.runs_of_scenario), progress)
+            RunMaker(variation, plans, cast(Tier, tier), folder.path / "logs").check(scenario)
+
+    return make_batches(
+        campaign.path,
+        folder,
+        batches_of(campaign, folder),
+        prepare,
+        lambda batch: campaign.runs.time_limit,
+        workers=workers,
+        scheduler=scheduler,
+        progress=progress,
+    )
+
+
+def make_batches(
+    file: Path,
+    folder: CampaignFolder,
+    batches: tuple[Batch, ...],
+    prepare: Callable[[Sequence[Batch]], None],
+    time_limit: Callable[[Batch], float],
+    *,
+    workers: int | None,
+    scheduler: str | None,
+    progress: Progress | None,
+) -> Outcome:
+    """Make the batches whose results are not there yet.
+
+    Args:
+        file: What says what they are; workers read the copy of it in the folder.
+        folder: Where results go.
+        batches: All of them.
+        prepare: Called with those that are not there, before any is made; what it raises ends the call.
+        time_limit: Longest that a worker may take for a piece of a batch, or between signs of life [s].
+        workers: As in ``run_campaign``, and so are the others and the errors.
+        scheduler: As there.
+        progress: As there.
+    """
+    advance = progress or (lambda doing, fraction: None)
+    if scheduler is not None:
+        check_scheduler(scheduler)
+    with _locked(folder):
+        write_atomically(folder.campaign, file.read_bytes())
+        missing = folder.missing(batches)
+        prepare(missing)
+        there, done = len(batches) - len(missing), 0
+        shutil.rmtree(folder.path / "attempts", ignore_errors=True)  # Who interrupts a run does not lose it.
+        orders = [Order(str(file.absolute()), str(folder.path), one, time_limit(one)) for one in missing]
+        for done, _ in enumerate(_made(orders, workers, scheduler) if orders else (), start=1):
+            advance(f"{there + done} of {len(batches)} batches", (there + done) / len(batches))
+        return Outcome(folder, batches, done)
+
+
+def _made(orders: Sequence[Order], workers: int | None, scheduler: str | None) -> Iterator[Batch]:
+    """Yield each batch when its file is there.
+
+    Raises:
+        ProcessError: Workers or the scheduler were lost for good.
+        OSError: Records cannot be written.
+    """
+    import distributed
+
+    waiting, batches = iter(orders), {f"batch-{order.batch.digest}": order.batch for order in orders}
+    with client_of(workers, scheduler) as client:
+
+        def submit(order: Order) -> distributed.Future:
+            return client.submit(make_batch, order, key=f"batch-{order.batch.digest}", pure=False)
+
+        futures = distributed.as_completed([submit(order) for order in islice(waiting, _WAITING)])
+        for future in futures:
+            try:
+                future.result()
+            except (distributed.KilledWorker, distributed.CancelledError) as error:
+                where = f"at {scheduler}" if scheduler else "of this command"
+                raise ProcessError(
+                    f"workers {where} were lost; the same command goes on from here"
+                ) from error
+            yield batches[future.key]
+            for order in islice(waiting, 1):
+                futures.add(submit(order))
+
+
+def check_scheduler(address: str) -> None:
+    """Refuse an address that no scheduler can have.
+
+    Raises:
+        ScenarioError: It has no host, no port, or begins with what Dask does not know.
+    """
+    from distributed.comm import parse_address, parse_host_port
+    from distributed.comm.registry import get_backend
+
+    allowed = "the address of a Dask scheduler, such as tcp://192.168.0.1:8786"
+    try:
+        scheme, location = parse_address(address)
+        host, port = parse_host_port(location)
+        get_backend(scheme)
+    except (ValueError, AssertionError) as error:
+        said = f"{allowed} ({error})" if str(error) else allowed
+        raise ScenarioError("the options", "--scheduler", address, said) from error
+    if not host or not 0 < int(port) < _PORTS:
+        raise ScenarioError("the options", "--scheduler", address, allowed)
+
+
+@contextmanager
+def client_of(workers: int | None, scheduler: str | None) -> Iterator[Client]:
+    """Connect to a scheduler, or start one with workers that end with the block."""
+    import dask
+    import distributed
+
+    if scheduler is not None:
+        with distributed.Client(scheduler) as client:
+            yield client
+        return
+    dask.config.update_defaults(_SETTINGS)
+    # Connections that close with the cluster are no news; what silences their logs ends before they do.
+    logging.getLogger("distributed").setLevel(logging.CRITICAL)
+    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as scratch:
+        with uninterrupted():  # Ctrl-C is for this process, which ends the others.
+            cluster = distributed.LocalCluster(
+                n_workers=workers or os.cpu_count() or 1,
+                threads_per_worker=1,
+                host="127.0.0.1",
+                dashboard_address="127.0.0.1:0",  # Dask serves something in any case; no port is taken twice.
+                scheduler_kwargs={"dashboard": False},
+                local_directory=scratch,
+                silence_logs=50,
+            )
+            client = distributed.Client(cluster)
+        with ended_by_signals(), cluster, client:
+            try:
+                yield client
+            finally:  # Dask would wait for batches that are being made.
+                for process in [worker.pid for worker in cluster.workers.values() if worker.pid]:
+                    with suppress(ProcessLookupError):
+                        os.kill(process, signal.SIGKILL)
+
+
+@contextmanager
+def _locked(folder: CampaignFolder) -> Iterator[None]:
+    """Hold the lock of a folder, which ends with this process however it ends.
+
+    Raises:
+        ScenarioError: Another process holds it.
+    """
+    folder.path.mkdir(parents=True, exist_ok=True)
+    with folder.lock.open("a+") as file:
         try:
-            for line in _timely(process.stdout, order.time_limit):
-                kind, content = json.loads(line)
-                if kind == "error":
-                    raise ProcessError(content)
-                if kind == "alive":
-                    continue
-                if kind == "begun":
-                    begun = order.batch.record(**content)
-                    continue
-                begun = None
-                yield kind, content
-                if kind == "costs":
-                    return
-        except TimeoutError:
-            raise _LostError(f"no result within {order.time_limit:g} s", begun) from None
-        finally:
-            process.kill()
-        raise _LostError(_end_of(process.wait(), errors), begun)
-
-
-def _timely(stream: IO[bytes], time_limit: float) -> Iterator[bytes]:
-    """Yield the lines of a stream, of which the second says that the first run has ended.
-
-    Raises:
-        TimeoutError: The next one has not come in time.
-    """
-    rest, seen = b"", 0
-    with selectors.DefaultSelector() as selector:
-        selector.register(stream, selectors.EVENT_READ)
-        while selector.select(time_limit if seen >= 2 else time_limit + _START):
-            part = os.read(stream.fileno(), 1 << 16)
-            if not part:
-                return
-            *lines, rest = (rest + part).split(b"\n")
-            seen += len(lines)
-            yield from lines
-    raise TimeoutError
-
-
-def _end_of(code: int, errors: IO[bytes]) -> str:
-    """Say how a process ended, with the last line that it wrote."""
-    errors.seek(0)
-    said = errors.read().decode(errors="replace").strip().splitlines()[-1:]
-    how = f"by signal {signal.Signals(-code).name}" if code < 0 else f"with code {code}"
-    return ": ".join([f"the process ended {how}", *said])
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            file.seek(0)
+            allowed = f"a folder in which no other command works; process {file.read().strip()} does"
+            raise ScenarioError(str(folder.path), "--out", str(folder.path), allowed) from None
+        file.truncate(0)
+        file.write(f"{os.getpid()}\n")
+        file.flush()
+        yield

@@ -3,14 +3,158 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from coop_drake.campaign.distributions import Count, Distribution
-from coop_drake.campaign.keys import Plain, Seed, check_keys
+import numpy as np
+
 from coop_drake.scenario.document import read_file
-from coop_drake.typed_data import HIDDEN, DataError, Limits, Positive
+from coop_drake.typed_data import EXACT, HIDDEN, TAGGED, DataError, Limits, NotNegative, Positive, Real
+
+# From what the values of a varied key are drawn: the distributions of Drake's schema, by the same names.
+
+_BETWEEN = 0.3819660112501051
+"""Where in an interval a number is tried for a key [-]: at no simple fraction of it."""
+
+
+@dataclass(frozen=True)
+class Deterministic:
+    """Always the same number.
+
+    Attributes:
+        value: The number, in the unit of the key.
+    """
+
+    value: Real
+
+    def draw(self, generator: np.random.Generator) -> float:
+        """Return the number."""
+        return self.value
+
+    def extremes(self) -> tuple[float, ...]:
+        """Return the number."""
+        return (self.value,)
+
+
+@dataclass(frozen=True)
+class Uniform:
+    """Any number between two, each as likely.
+
+    Attributes:
+        min: Smallest number, in the unit of the key.
+        max: Largest number; it is itself never drawn unless it is the smallest, too.
+    """
+
+    min: Real
+    max: Real
+
+    def __post_init__(self) -> None:
+        if self.max < self.min:
+            raise DataError("max", self.max, f"a number of at least min, {self.min:g}")
+
+    def draw(self, generator: np.random.Generator) -> float:
+        """Draw a number."""
+        return float(generator.uniform(self.min, self.max))
+
+    def extremes(self) -> tuple[float, ...]:
+        """Return the ends of the interval, and a number between that is not whole."""
+        return self.min, self.max, self.min + _BETWEEN * (self.max - self.min)
+
+
+@dataclass(frozen=True)
+class Gaussian:
+    """A normal distribution. What the key does not allow is drawn again, so that its limits cut it off.
+
+    Attributes:
+        mean: Mean, in the unit of the key.
+        stddev: Standard deviation.
+    """
+
+    mean: Real
+    stddev: NotNegative
+
+    def draw(self, generator: np.random.Generator) -> float:
+        """Draw a number."""
+        return float(generator.normal(self.mean, self.stddev))
+
+    def extremes(self) -> tuple[float, ...]:
+        """Return the mean: there are no ends."""
+        return (self.mean,)
+
+
+@dataclass(frozen=True)
+class UniformDiscrete:
+    """One of some numbers, each as likely.
+
+    Attributes:
+        values: The numbers, in the unit of the key.
+    """
+
+    values: tuple[Real, ...]
+
+    def __post_init__(self) -> None:
+        if not self.values:
+            raise DataError("values", [], "a list of at least one number")
+
+    def draw(self, generator: np.random.Generator) -> float:
+        """Draw one of the numbers."""
+        return self.values[int(generator.integers(len(self.values)))]
+
+    def extremes(self) -> tuple[float, ...]:
+        """Return all numbers."""
+        return self.values
+
+
+Distribution = Annotated[Deterministic | Uniform | Gaussian | UniformDiscrete, TAGGED]
+"""What a varied key is drawn from, by its tag."""
+
+Count = Annotated[int, Limits(at_least=1)]
+"""A number of things of which there is at least one."""
+
+
+# Types of values that stand in several sections of a campaign file.
+
+Plain = Any
+"""A value as it would stand in a scenario file; the scenario's own key says what is allowed."""
+
+LARGEST_SEED = 2**32 - 1
+"""Largest seed: numpy and optimisers take no larger one everywhere, and tables of records hold it."""
+
+Seed = Annotated[int, Limits(at_least=0, below=LARGEST_SEED + 1), EXACT]
+"""From what numbers are drawn."""
+
+SEED_KEY = "deployment.seed"
+"""The key of the seed of noise and losses, which every run has of its own."""
+
+
+def check_keys(said: Mapping[str, Any], **varied: Mapping[str, Any]) -> None:
+    """Refuse a seed that would be ignored, and values that would overwrite others inside them.
+
+    What ``set`` says of a whole section may be varied in parts.
+
+    Args:
+        said: What ``set`` says, by dotted keys.
+        varied: What differs from run to run, by dotted keys, each by the name of its section.
+
+    Raises:
+        DataError: With the key and what is allowed there.
+    """
+    top, _, name = SEED_KEY.partition(".")
+    whole = said.get(top)
+    if SEED_KEY in said or (isinstance(whole, dict) and name in whole):
+        allowed = "no seed: every run has one of its own, which grid may state"
+        raise DataError(f"set.{SEED_KEY}", said.get(SEED_KEY, whole), allowed)
+    sections = {"set": said, **varied}
+    places = [(section, key) for section, keys in sections.items() for key in keys]
+    for section, outer in places:
+        for other, inner in places:
+            inside = inner.startswith((f"{outer}.", f"{outer}["))
+            if inside and (section != "set" or other == "set"):
+                allowed = f"no key around {other}.{inner}: each would overwrite the other"
+                raise DataError(f"{section}.{outer}", sections[section][outer], allowed)
+
 
 Tier = Literal["drake", "compiled"]
 """Which loop a run is made by."""

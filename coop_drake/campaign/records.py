@@ -1,14 +1,30 @@
-"""What a run of a campaign leaves: one row of a Parquet file."""
+"""The results of a campaign: records of runs, and one Parquet file for each batch, whole or not there."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import astuple, dataclass, fields
-from math import nan
-from typing import TYPE_CHECKING, Any, get_type_hints
+import json
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import suppress
+from dataclasses import asdict, astuple, dataclass, fields
+from functools import cache
+from math import isnan, nan
+from pathlib import Path
+from pkgutil import resolve_name
+from typing import TYPE_CHECKING, Any, get_args, get_type_hints
+
+import numpy as np
+
+from coop_drake.answers.digest import content_digest
+from coop_drake.campaign.file import Campaign, Tier
+from coop_drake.campaign.plans import Plans, scenario_content, source_digest
+from coop_drake.campaign.variation import Variation
+from coop_drake.errors import CoopDrakeError
+from coop_drake.files import write_atomically
 
 if TYPE_CHECKING:
     import pyarrow
+
+# What a run of a campaign leaves: one row of a Parquet file.
 
 
 @dataclass(frozen=True)
@@ -84,3 +100,290 @@ def table_of(records: Iterable[Record], kind: type[Record]) -> pyarrow.Table:
     rows = [astuple(record) for record in records]
     columns: list[list[Any]] = [list(column) for column in zip(*rows, strict=True)] or [[] for _ in schema]
     return pyarrow.table(dict(zip(schema.names, columns, strict=True)), schema=schema)
+
+
+# The batches of a campaign: consecutive pieces of work, such as runs, of one process and of one file.
+
+Task = tuple[Record, Callable[[], Record]]
+"""The record of a piece of work while it is done, and what does it."""
+
+
+@dataclass(frozen=True)
+class Work:
+    """A kind of work that processes do batch by batch; programs may have kinds of their own.
+
+    Attributes:
+        folder: Name of the folder of its files, in that of the results.
+        record: What each piece of it leaves: a frozen dataclass of numbers and texts with a ``reason``.
+        tasks: Where a function returns the pieces that an order asks for, an iterator of `Task`, as
+            ``module:name``; only the process that does the work imports it. It is given the fields of
+            `Order`, with ``begin`` for the index of the first piece, and what is to be called now and then in
+            pieces that take long.
+    """
+
+    folder: str
+    record: type[Record]
+    tasks: str
+
+
+RUNS = Work("runs", RunRecord, "coop_drake.campaign.runs:tasks")
+"""The work of which campaigns consist: runs of transports."""
+
+
+@dataclass(frozen=True)
+class Batch:
+    """Consecutive runs of one scenario in one tier, or pieces of other work.
+
+    Attributes:
+        scenario: Index of the scenario in its section of the file; 0 for work without any.
+        tier: By which loop runs are made; a name for other work.
+        first: Index of the first run or piece.
+        stop: Index behind the last one.
+        digest: SHA-256 of all that their results depend on; names their file.
+        work: Where the `Work` is, as ``module:name``.
+    """
+
+    scenario: int
+    tier: str
+    first: int
+    stop: int
+    digest: str
+    work: str = f"{__name__}:RUNS"
+
+    @property
+    def record(self) -> type[Record]:
+        """What each of its runs or pieces leaves."""
+        return work_of(self.work).record
+
+    @property
+    def file(self) -> Path:
+        """The file of its records, in the folder of the results."""
+        return Path(work_of(self.work).folder) / f"{self.digest}.parquet"
+
+    @property
+    def costs(self) -> Path:
+        """The file that says what it took; other than the records it is never the same twice."""
+        return Path("costs") / f"{self.digest}.json"
+
+
+def work_of(name: str) -> Work:
+    """Return a kind of work by its place, as ``module:name``."""
+    found: Work = resolve_name(name)
+    return found
+
+
+class Batching:
+    """Divides a campaign into batches.
+
+    Args:
+        variation: Its runs.
+        plans: Their plans.
+    """
+
+    def __init__(self, variation: Variation, plans: Plans) -> None:
+        self._variation, self._plans = variation, plans
+        self._content = cache(self._content_of)
+
+    def batches(self) -> Iterator[Batch]:
+        """Yield all batches: Drake's first, because they take longest."""
+        for tier in get_args(Tier):
+            for scenario in range(len(self._variation.scenarios)):
+                indices, size = self._variation.indices(scenario, tier), self._variation.runs.batch_of(tier)
+                for first in range(indices.start, indices.stop, size):
+                    yield self.batch(scenario, tier, first, min(first + size, indices.stop))
+
+    def batch(self, scenario: int, tier: Tier, first: int, stop: int) -> Batch:
+        """Return one batch; the arguments are those of `Batch`."""
+        content = {**self._content(scenario), "tier": tier, "first": first, "stop": stop}
+        return Batch(scenario, tier, first, stop, content_digest(content))
+
+    def _content_of(self, scenario: int) -> dict[str, Any]:
+        """Return what the results of a scenario's runs depend on, but for their tier and indices."""
+        runs = self._variation.runs
+        first = self._variation.run(scenario * self._variation.runs_of_scenario)
+        return {
+            **scenario_content(self._variation.scenarios[scenario]),
+            "plan": self._plans.digest_of(first),
+            "vary": {key: repr(one) for key, one in runs.vary.items()},
+            "grid": {key: list(values) for key, values in runs.grid.items()},
+            "runs of a combination": runs.count if runs.grid else None,
+            "seed": runs.seed,
+            "keep": runs.keep,
+        }
+
+
+# The folder of a campaign's results: one Parquet file for each batch, whole or not there.
+
+
+@dataclass(frozen=True)
+class CampaignFolder:
+    """Where the results of a campaign are.
+
+    Attributes:
+        path: The folder; it is made when the first result is there.
+    """
+
+    path: Path
+
+    @property
+    def campaign(self) -> Path:
+        """The campaign file as it was when the command began."""
+        return self.path / "campaign.yaml"
+
+    @property
+    def plans(self) -> Path:
+        """The plans that runs follow, named by digests."""
+        return self.path / "plans"
+
+    @property
+    def lock(self) -> Path:
+        """The file that a command which works in the folder holds a lock of."""
+        return self.path / ".lock"
+
+    def write(self, batch: Batch, records: Iterable[Record]) -> None:
+        """Write the records of a batch, whole or not at all.
+
+        Raises:
+            OSError: The file cannot be written.
+        """
+        write_table(self.path / batch.file, table_of(records, batch.record))
+
+    def has(self, batch: Batch) -> bool:
+        """Whether the records of a batch are there; a damaged file counts as missing."""
+        import pyarrow.parquet
+
+        try:
+            metadata = pyarrow.parquet.read_metadata(self.path / batch.file)
+        except (OSError, pyarrow.ArrowInvalid):
+            return False
+        return bool(metadata.num_rows == batch.stop - batch.first)
+
+    def missing(self, batches: Iterable[Batch]) -> list[Batch]:
+        """Return the batches whose records are not there."""
+        return [batch for batch in batches if not self.has(batch)]
+
+    def table(self, batches: Sequence[Batch]) -> pyarrow.Table:
+        """Return the records of those batches of runs that are there, sorted by run and tier."""
+        return self.records(batches, RunRecord).sort_by([("run", "ascending"), ("tier", "ascending")])
+
+    def records(self, batches: Sequence[Batch], kind: type[Record]) -> pyarrow.Table:
+        """Return the records of one kind that are there, batch by batch."""
+        import pyarrow
+
+        mine = [one for one in batches if one.record is kind]
+        there = [self._read(one) for one in mine if self.has(one)]
+        return pyarrow.concat_tables(there) if there else schema_of(kind).empty_table()
+
+    def _read(self, batch: Batch) -> pyarrow.Table:
+        import pyarrow.parquet
+
+        file = self.path / batch.file
+        try:
+            return pyarrow.parquet.read_table(file, columns=schema_of(batch.record).names)
+        except (OSError, pyarrow.ArrowInvalid) as error:
+            again = "remove it, and the same command makes its runs again"
+            raise CoopDrakeError(f"{file} is damaged ({' '.join(str(error).split())}); {again}") from error
+
+    def costs(self, batches: Iterable[Batch]) -> list[dict[str, Any]]:
+        """Return what the batches took whose costs are known, as `note` was told."""
+        known = []
+        for batch in batches:
+            with suppress(OSError, ValueError):  # Results do not depend on these files.
+                known.append(json.loads((self.path / batch.costs).read_bytes()))
+        return known
+
+    def cpu_seconds(self, batches: Iterable[Batch]) -> float:
+        """Return the mean processor time of a run or piece of work with its share of starting, or NaN."""
+        costs = self.costs(batches)
+        counted = sum(entry["runs"] for entry in costs)
+        return sum(entry["cpu_seconds"] for entry in costs) / counted if counted else nan
+
+    def by_other_sources(self, batches: Iterable[Batch]) -> int:
+        """Return how many batches were made while the sources of this package were other ones than now."""
+        return sum(entry.get("sources") != source_digest() for entry in self.costs(batches))
+
+    def note(self, batch: Batch, costs: dict[str, Any]) -> None:
+        """Write what a batch took."""
+        write_atomically(self.path / batch.costs, json.dumps(costs, sort_keys=True).encode() + b"\n")
+
+
+def write_table(path: Path, table: pyarrow.Table) -> None:
+    """Write a table as a Parquet file, whole or not at all; the same rows give the same bytes."""
+    import pyarrow.parquet
+
+    write_atomically(path, lambda stream: pyarrow.parquet.write_table(table, stream))
+
+
+@dataclass(frozen=True)
+class State:
+    """Runs of one scenario in one tier.
+
+    Attributes:
+        scenario: Name of the scenario.
+        tier: The tier.
+        runs: How many there shall be.
+        done: How many are there.
+        lost: How many of these did not arrive.
+        funnel_margin: Least distance of an axis to a bound of its funnel, NaN if none is known [rad or m].
+        clearance: Least distance to walls and between bodies, NaN if none is known [m].
+        budget_share: Largest share used of what the plan's budget states, NaN if none is known [-].
+        cpu_seconds: Processor time of a run, with its share of starting processes, NaN if not known [s].
+    """
+
+    scenario: str
+    tier: str
+    runs: int
+    done: int
+    lost: int
+    funnel_margin: float
+    clearance: float
+    budget_share: float
+    cpu_seconds: float
+
+    def facts(self) -> dict[str, Any]:
+        """Return all by name; null where nothing is known."""
+        content = asdict(self)
+        return {key: None if isinstance(v, float) and isnan(v) else v for key, v in content.items()}
+
+    def cells(self) -> tuple[str, ...]:
+        """Return a row of a table: distances in rad and m, and seconds."""
+        margins = (
+            f"{self.funnel_margin:.4f}",
+            f"{self.clearance:.4f}",
+            f"{100.0 * self.budget_share:.1f} %",
+            f"{self.cpu_seconds:.3f}",
+        )
+        shown = ("" if text.startswith("nan") else text for text in margins)
+        return f"{self.scenario}, {self.tier}", str(self.runs), str(self.done), str(self.lost), *shown
+
+
+def state_of(campaign: Campaign, folder: CampaignFolder, batches: Sequence[Batch]) -> tuple[State, ...]:
+    """Return the state of every scenario and tier that a campaign has runs of."""
+    rows = []
+    for key in dict.fromkeys((batch.scenario, batch.tier) for batch in batches):
+        mine = [batch for batch in batches if (batch.scenario, batch.tier) == key]
+        table = folder.table(mine)
+        column = {name: table.column(name).to_numpy() for name in _COLUMNS}
+        rows.append(
+            State(
+                Variation(campaign).scenarios[key[0]].name,
+                key[1],
+                sum(batch.stop - batch.first for batch in mine),
+                table.num_rows,
+                int((~column["arrived"]).sum()),
+                _least(column["funnel_margin"]),
+                _least(np.concatenate([column[name] for name in _CLEARANCES])),
+                -_least(-column["budget_share"]),
+                folder.cpu_seconds(mine),
+            )
+        )
+    return tuple(rows)
+
+
+_CLEARANCES = ("wall_clearance", "body_clearance")
+_COLUMNS = ("funnel_margin", "arrived", "budget_share", *_CLEARANCES)
+
+
+def _least(values: np.ndarray) -> float:
+    known = values[~np.isnan(values)]
+    return float(known.min()) if known.size else nan

@@ -1,15 +1,27 @@
-"""The measured columns of a table of runs, how they are called and shown, and which rows belong together."""
+"""The report of a campaign: rates with their bounds, distributions, the worst runs, as a page and as JSON."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import json
+import math
+from collections import Counter
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass
+from decimal import ROUND_CEILING, Context, Decimal
 from functools import cached_property
+from math import isnan, nan
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from coop_drake.drawing import colours
+from coop_drake.files import write_atomically
+from coop_drake.templates import rendered
 from coop_drake.tree.pose import FloatArray, IntArray
+
+# The measured columns of a table of runs, how they are called and shown, and which rows belong together.
 
 
 @dataclass(frozen=True)
@@ -120,3 +132,407 @@ class Runs:
             if rows.size:
                 found.append((scenario, tier, rows))
         return tuple(found)
+
+
+# How often runs are lost: the share counted, and the bound below which the true one lies.
+
+CONFIDENCE = 0.95
+"""Probability with which the true share of lost runs is not above its bound, at least [-]."""
+
+
+@dataclass(frozen=True)
+class Rate:
+    """A share of lost runs with the upper bound of Clopper and Pearson.
+
+    Attributes:
+        lost: Runs that did not arrive, or broke an invariant.
+        runs: Runs counted.
+        upper: Upper bound of the true share; all of the error's probability is on this side, however many
+            were lost, so that it is 1 - (1 - confidence)^(1 / runs) where none was [-].
+        confidence: Probability with which the true share is not above the bound, at least [-].
+    """
+
+    lost: int
+    runs: int
+    upper: float
+    confidence: float
+
+    @property
+    def sentence(self) -> str:
+        """What was counted and what follows, in words."""
+        counted = f"None of {self.runs:,} runs was lost."
+        if self.lost:
+            share, were = percent(self.lost / self.runs), "was" if self.lost == 1 else "were"
+            counted = f"{self.lost:,} of {self.runs:,} runs {were} lost, {share}."
+        sure = f"With {100.0 * self.confidence:g} % confidence"
+        return f"{counted} {sure}, at most {percent_up(self.upper)} of them are."
+
+
+def loss_rate(lost: int, runs: int, confidence: float = CONFIDENCE) -> Rate:
+    """Return the share of lost runs with its exact upper bound (Clopper and Pearson).
+
+    The bound has the same form whatever was counted: one that is chosen after the runs were counted would be
+    wrong more often than it says.
+
+    Args:
+        lost: Runs that were lost.
+        runs: Runs counted, at least one.
+        confidence: Probability with which the true share is not above the bound, at least [-].
+
+    Raises:
+        ValueError: There are no runs, or more are lost than there are.
+    """
+    from scipy.stats import binomtest
+
+    interval = binomtest(lost, runs, alternative="less").proportion_ci(confidence, method="exact")
+    return Rate(lost, runs, float(interval.high), confidence)
+
+
+def percent(share: float) -> str:
+    """A share in per cent with two significant digits."""
+    return f"{100.0 * share:.2g} %" if share < 0.995 else f"{100.0 * share:.3g} %"
+
+
+def percent_up(share: float) -> str:
+    """An upper bound in per cent, rounded up to two significant digits, and to three from 99 % on."""
+    exact = Decimal(repr(float(share))) * 100
+    return f"{float(Context(2 if share <= 0.99 else 3, ROUND_CEILING).plus(exact)):.3g} %"
+
+
+# Distributions of margins, time and forces, and the share of lost runs, by scenario and tier.
+
+_BINS = 30
+"""Bins of a histogram [-]: a hill of a figure is some hundred points wide."""
+
+_SAME = 4 * _BINS
+"""Values whose range is at most this many units in the last place count as one value [-]."""
+
+_REASONS = 5
+"""Reasons for losses that are listed, the most frequent ones."""
+
+
+@dataclass(frozen=True)
+class Distribution:
+    """How the values of a column are distributed, in its own unit; numbers are NaN where there are no values.
+
+    Attributes:
+        count: Values that are numbers.
+        least: Smallest value.
+        low: Below it are 5 % of them.
+        median: Below it is one half.
+        high: Below it are 95 %.
+        largest: Largest value.
+        heights: Counts of values in bins of equal width from the smallest to the largest value.
+    """
+
+    count: int
+    least: float
+    low: float
+    median: float
+    high: float
+    largest: float
+    heights: tuple[int, ...]
+
+
+NOTHING = Distribution(0, nan, nan, nan, nan, nan, ())
+"""The distribution of no values."""
+
+
+@dataclass(frozen=True)
+class Group:
+    """The runs of one scenario in one tier.
+
+    Attributes:
+        scenario: Name of the scenario.
+        tier: Which loop simulated it.
+        rate: How many were lost.
+        reasons: The most frequent reasons for losses, with their counts.
+        measures: Distribution of every column that has numbers, by its name; margins over all runs, times and
+            forces over those that arrived.
+    """
+
+    scenario: str
+    tier: str
+    rate: Rate
+    reasons: tuple[tuple[str, int], ...]
+    measures: dict[str, Distribution]
+
+
+def distribution(values: FloatArray) -> Distribution | None:
+    """Return the distribution of values, NaN left out; None if there are no others."""
+    numbers = values[np.isfinite(values)]
+    if numbers.size == 0:
+        return None
+    low, median, high = np.quantile(numbers, (0.05, 0.5, 0.95))
+    ends = float(numbers.min()), float(numbers.max())
+    return Distribution(
+        int(numbers.size), ends[0], float(low), float(median), float(high), ends[1], _heights(numbers, ends)
+    )  # fmt: skip
+
+
+def _heights(numbers: FloatArray, ends: tuple[float, float]) -> tuple[int, ...]:
+    """Return the counts in bins between the ends; all in the middle one where these would be rounding."""
+    if ends[1] - ends[0] <= _SAME * np.spacing(max(map(abs, ends))):
+        return tuple(numbers.size if place == _BINS // 2 else 0 for place in range(_BINS))
+    return tuple(int(height) for height in np.histogram(numbers, bins=_BINS, range=ends)[0])
+
+
+def summarise(runs: Runs, confidence: float) -> tuple[Group, ...]:
+    """Return how the runs of every scenario and tier went."""
+    columns = {measure: runs.floats(measure.name) for measure in MEASURES}
+    groups = []
+    for scenario, tier, rows in runs.groups:
+        lost = runs.lost[rows]
+        known = {
+            measure.name: distribution(column[rows] if measure.margin else column[rows][~lost])
+            for measure, column in columns.items()
+        }
+        counted = Counter(runs.text("reason", row) for row in rows[lost])
+        groups.append(
+            Group(
+                scenario,
+                tier,
+                loss_rate(int(lost.sum()), rows.size, confidence),
+                tuple(counted.most_common(_REASONS)),
+                {name: values for name, values in known.items() if values is not None},
+            )
+        )
+    return tuple(groups)
+
+
+# The runs that came nearest to a limit.
+
+LISTED = 10
+"""Runs that are listed [-]."""
+
+
+@dataclass(frozen=True)
+class WorstRun:
+    """A run that was lost, or had little of a margin left.
+
+    Attributes:
+        run: Its number in the campaign.
+        scenario: Name of the scenario.
+        tier: Which loop simulated it.
+        seed: Seed of its noise.
+        arrived: Whether it arrived.
+        reason: Why not; empty if it arrived.
+        measure: Name of the margin of which it had least, compared with other runs of its scenario.
+        margin: What it had of this, in the unit of the column.
+        share: The same over the median of its scenario and tier [-].
+        used: Share that it used of what the budget states; NaN without a budget [-].
+        values: JSON of the keys that vary.
+    """
+
+    run: int
+    scenario: str
+    tier: str
+    seed: int
+    arrived: bool
+    reason: str
+    measure: str
+    margin: float
+    share: float
+    used: float
+    values: str
+
+
+def worst_runs(runs: Runs, count: int = LISTED) -> tuple[WorstRun, ...]:
+    """Return lost runs, then those that used more than the budget states, then those with the least margins.
+
+    Margins count relative to the median of their scenario and tier.
+    """
+    margins = np.array([runs.floats(measure.name) for measure in MARGINS])
+    shares = np.full_like(margins, np.inf)
+    for _, _, rows in runs.groups:
+        for k in range(len(MARGINS)):
+            known = margins[k, rows][np.isfinite(margins[k, rows])]
+            if known.size and (typical := float(np.median(known))) > 0.0:
+                shares[k, rows] = margins[k, rows] / typical
+    shares[np.isnan(shares)] = np.inf
+    numbers, used = runs.integers("run"), runs.floats(SHARE)
+    beyond = np.where(used > 1.0, -used, 0.0)
+    order = np.lexsort((numbers, shares.min(axis=0), beyond, ~runs.lost))[:count]
+    seeds, found = runs.integers("seed"), []
+    for row in order:
+        k = int(np.argmin(shares[:, row]))
+        known_share = bool(np.isfinite(shares[k, row]))
+        found.append(
+            WorstRun(
+                int(numbers[row]),
+                runs.text("scenario", row),
+                runs.text("tier", row),
+                int(seeds[row]),
+                not runs.lost[row],
+                runs.text("reason", row),
+                MARGINS[k].name if known_share else "",
+                float(margins[k, row]) if known_share else float("nan"),
+                float(shares[k, row]) if known_share else float("nan"),
+                float(used[row]),
+                runs.text("values", row),
+            )
+        )
+    return tuple(found)
+
+
+# All numbers of a report, gathered once for the page and for machines.
+
+
+@dataclass(frozen=True)
+class Report:
+    """What a campaign found.
+
+    Attributes:
+        title: Name of the campaign.
+        facts: What was asked for: name and value, in the order shown.
+        rate: How many of all runs were lost; None without runs. Here and in the next number a run that both
+            tiers made counts once: it has the same values and the same seed in both, and is lost if it was
+            lost in any.
+        exceeded: Runs that used more than all of what the budget states, lost or not.
+        most_used: Largest share of what the budget states that a run used; NaN where none is known [-].
+        groups: The runs of every scenario and tier.
+        worst: The worst runs.
+        missing: Batches of the campaign that are not made yet. Slow ones come last: what is there is not a
+            random sample of what was asked for.
+    """
+
+    title: str
+    facts: tuple[tuple[str, str], ...]
+    rate: Rate | None
+    exceeded: int
+    most_used: float
+    groups: tuple[Group, ...]
+    worst: tuple[WorstRun, ...]
+    missing: int
+
+    def to_json(self) -> str:
+        """Return all numbers as JSON; numbers that are not finite are null."""
+        return json.dumps(_finite(asdict(self)), indent=1, ensure_ascii=False) + "\n"
+
+
+def make_report(
+    title: str,
+    runs: Any = None,
+    *,
+    facts: Sequence[tuple[str, str]] = (),
+    missing: int = 0,
+    confidence: float = CONFIDENCE,
+) -> Report:
+    """Compute a report from the table of a campaign's runs.
+
+    Args:
+        title: Name of the campaign.
+        runs: A pyarrow table with the columns of ``RunRecord``, None for no runs.
+        facts: What was asked for: name and value.
+        missing: Batches of the campaign that are not made yet.
+        confidence: Probability with which a true rate is not above its bound, at least [-].
+    """
+    known = None if runs is None or runs.num_rows == 0 else Runs(runs)
+    used = np.empty(0) if known is None else known.floats(SHARE)
+    return Report(
+        title,
+        tuple(facts),
+        None
+        if known is None
+        else loss_rate(known.count_trials(known.lost), known.count_trials(), confidence),
+        0 if known is None else known.count_trials(used > 1.0),
+        float(np.nanmax(used)) if np.isfinite(used).any() else math.nan,
+        () if known is None else summarise(known, confidence),
+        () if known is None else worst_runs(known),
+        missing,
+    )
+
+
+def _finite(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _finite(one) for key, one in value.items()}
+    if isinstance(value, list | tuple):
+        return [_finite(one) for one in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+# The report as one self-contained HTML page, and the same numbers as JSON.
+
+PAGE, NUMBERS = "report.html", "report.json"
+"""Names of the two files."""
+
+_BY_NAME = {measure.name: measure for measure in MEASURES}
+
+
+def write_report(report: Report, directory: Path, replay: Callable[[WorstRun], str]) -> list[Path]:
+    """Write the page and the numbers into a directory, and return the two files.
+
+    Args:
+        report: What the campaign found.
+        directory: Where; it is made if it is not there.
+        replay: Returns the command that replays a run.
+    """
+    directory.mkdir(parents=True, exist_ok=True)
+    page = render_page(report, replay)
+    return [
+        write_atomically(directory / PAGE, page.encode()),
+        write_atomically(directory / NUMBERS, report.to_json().encode()),
+    ]
+
+
+def render_page(report: Report, replay: Callable[[WorstRun], str]) -> str:
+    """Return the page as HTML; it needs no other file and no script."""
+    from coop_drake.campaign.report_figures import distributions_svg
+
+    return rendered(
+        "coop_drake.campaign",
+        "report.html",
+        report=report,
+        headline=headline(report),
+        verdict=verdict(report),
+        rows=[_row(group) for group in report.groups],
+        margins=MARGINS,
+        worst=[(run, _shown(run.measure, run.margin), replay(run)) for run in report.worst],
+        percent=percent,
+        percent_up=percent_up,
+        figures={
+            "margins": distributions_svg(report.groups, MARGINS),
+            "costs": distributions_svg(report.groups, COSTS),
+        },
+        colours=colours,
+    )
+
+
+def headline(report: Report) -> str:
+    """The most important sentence of a report, and whether it is complete."""
+    told = []
+    if report.rate is not None:
+        told.append(report.rate.sentence)
+    if report.exceeded:
+        runs = "1 run" if report.exceeded == 1 else f"{report.exceeded:,} runs"
+        told.append(f"{runs} used more than the budget states, up to {percent(report.most_used)} of it.")
+    if report.missing:
+        several = "1 batch is" if report.missing == 1 else f"{report.missing:,} batches are"
+        told.append(f"The campaign is not complete: {several} missing.")
+    return " ".join(told) or "There are no results yet."
+
+
+def verdict(report: Report) -> str:
+    """``bad`` where a run was lost; ``some`` where more was used than is budgeted, or results are missing."""
+    if report.rate is not None and report.rate.lost:
+        return "bad"
+    return "some" if report.exceeded or report.missing else "good"
+
+
+def _shown(name: str, number: float) -> str:
+    measure: Measure | None = _BY_NAME.get(name)
+    return f"{measure.shown(number)} {measure.unit}" if measure is not None and not isnan(number) else ""
+
+
+def _row(group: Group) -> dict[str, Any]:
+    """What the first table shows of a group."""
+    least = {
+        one.name: one.shown(group.measures[one.name].least) for one in MARGINS if one.name in group.measures
+    }
+    time, force = group.measures.get("time"), group.measures.get("peak_force")
+    return {
+        "group": group,
+        "least": least,
+        "time": "" if time is None else f"{time.median:.1f} s, {time.largest:.1f} s",
+        "force": "" if force is None else f"{force.largest:.0f} N",
+    }

@@ -14,9 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from coop_drake.campaign.distributions import Distribution, Gaussian
-from coop_drake.campaign.keys import SEED_KEY
-from coop_drake.campaign.settings import Campaign, Runs, Tier
+from coop_drake.campaign.file import SEED_KEY, Campaign, Distribution, Gaussian, Runs, Tier
 from coop_drake.errors import ScenarioError
 from coop_drake.scenario.budget_file import names_file
 from coop_drake.scenario.checks import validate

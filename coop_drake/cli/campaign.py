@@ -21,9 +21,8 @@ from coop_drake.viz.drawing_processes import DrawingProcesses
 
 if TYPE_CHECKING:
     from coop_drake.campaign import Campaign, RunRecord
-    from coop_drake.campaign.batches import Batch
-    from coop_drake.campaign.results import CampaignFolder
-    from coop_drake.campaign.settings import Tier
+    from coop_drake.campaign.file import Tier
+    from coop_drake.campaign.records import Batch, CampaignFolder
 
 EXAMPLES = (
     ("campaign many.campaign.yaml", "make all runs, or those that are missing, into out/campaigns/many/"),
@@ -79,7 +78,7 @@ def run_command(
     """
     with reporting(machine=machine, quiet=quiet) as reporter:
         campaign, folder = _read(file, out)
-        from coop_drake.campaign.running import run_campaign
+        from coop_drake.campaign.execution import run_campaign
 
         with reporter.stage("campaign", "campaign") as progress:
             outcome = run_campaign(
@@ -143,7 +142,7 @@ def replay_command(
 def _read(file: Path, out: Path | None) -> tuple[Campaign, CampaignFolder]:
     """Read a campaign file, and say where its results go."""
     from coop_drake.campaign import load_campaign
-    from coop_drake.campaign.results import CampaignFolder
+    from coop_drake.campaign.records import CampaignFolder
 
     campaign = load_campaign(file)
     return campaign, CampaignFolder((out or Path("out") / "campaigns" / campaign.name).absolute())
@@ -162,7 +161,7 @@ def _facts(campaign: Campaign, by_other_sources: int) -> list[tuple[str, str]]:
 
 
 def _with_batches(file: Path, out: Path | None) -> tuple[Campaign, CampaignFolder, tuple[Batch, ...]]:
-    from coop_drake.campaign.running.command import batches_of
+    from coop_drake.campaign.execution import batches_of
 
     campaign, folder = _read(file, out)
     return campaign, folder, batches_of(campaign, folder)
@@ -172,7 +171,7 @@ def _show_state(
     campaign: Campaign, folder: CampaignFolder, batches: tuple[Batch, ...], reporter: Reporter
 ) -> None:
     """Show what a campaign has come to so far; a lost run makes the command fail."""
-    from coop_drake.campaign.state import state_of
+    from coop_drake.campaign.records import state_of
 
     rows = state_of(campaign, folder, batches)
     reporter.facts.update(
@@ -216,9 +215,8 @@ def _replay(
     """
     from coop_drake.answers.log import SimulationLog
     from coop_drake.answers.plan_file import plan_digest
-    from coop_drake.campaign.measuring import record_of_log
     from coop_drake.campaign.plans import Plans
-    from coop_drake.campaign.running.making import RunMaker, run_digest
+    from coop_drake.campaign.runs import RunMaker, record_of_log, run_digest
     from coop_drake.campaign.variation import Variation
     from coop_drake.plant import planning_problem
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Iterator
 
-from coop_drake.campaign.settings import Campaign
+from coop_drake.campaign.file import Campaign
 from docs.generate.scenario_keys import ScenarioKey, Section, sections
 
 __all__ = ["campaign_page", "scenario_page"]

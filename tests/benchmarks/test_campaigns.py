@@ -9,7 +9,7 @@ from benchmarks.campaigns import __main__ as campaigns
 from benchmarks.searches.findings import BreakingPoint
 from benchmarks.study import batches_of, load_study
 from coop_drake.campaign import load_campaign
-from coop_drake.campaign.results import CampaignFolder
+from coop_drake.campaign.records import CampaignFolder
 
 FILES = sorted(Path(campaigns.__file__).parent.glob("*.yaml"))
 

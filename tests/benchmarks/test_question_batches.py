@@ -10,9 +10,9 @@ from benchmarks.app import app
 from benchmarks.questions.answering import CASES, MEASURED, QuestionRecord, ask, question_batches
 from benchmarks.questions.settings import QuestionSettings
 from benchmarks.study import Study, batches_of, load_study
+from coop_drake.campaign.execution import Order, make_batch
 from coop_drake.campaign.plans import source_digest
-from coop_drake.campaign.results import CampaignFolder
-from coop_drake.campaign.running import Order, make_batch
+from coop_drake.campaign.records import CampaignFolder
 from coop_drake.errors import ScenarioError
 
 FILE = """

@@ -16,8 +16,8 @@ from benchmarks.searches.searching import Searching, search_batches
 from benchmarks.study import load_study, make_study
 from coop_drake.campaign import load_campaign
 from coop_drake.campaign.plans import Plans
-from coop_drake.campaign.results import CampaignFolder
-from coop_drake.campaign.running.making import RunMaker
+from coop_drake.campaign.records import CampaignFolder
+from coop_drake.campaign.runs import RunMaker
 from coop_drake.campaign.variation import Variation
 from coop_drake.errors import ScenarioError
 from tests.support.cli import invoke

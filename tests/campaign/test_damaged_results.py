@@ -2,9 +2,7 @@
 
 import pytest
 
-from coop_drake.campaign.batches import Batch
-from coop_drake.campaign.records import RunRecord
-from coop_drake.campaign.results import CampaignFolder
+from coop_drake.campaign.records import Batch, CampaignFolder, RunRecord
 from coop_drake.errors import CoopDrakeError
 
 

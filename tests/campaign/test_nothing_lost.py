@@ -9,22 +9,18 @@ import shutil
 import signal
 import subprocess
 import sys
-import tempfile
-import threading
 from contextlib import ExitStack
-from dataclasses import asdict, replace
 from pathlib import Path
 
 import pytest
 
-from coop_drake.campaign.batches import Batching
+from coop_drake.campaign.execution import Order, make_batch, make_batches
+from coop_drake.campaign.file import load_campaign
 from coop_drake.campaign.plans import Plans
-from coop_drake.campaign.results import CampaignFolder, write_table
-from coop_drake.campaign.running import Order, make_batch, supervising
-from coop_drake.campaign.running.making import RunMaker
-from coop_drake.campaign.settings import load_campaign
+from coop_drake.campaign.records import Batch, Batching, CampaignFolder, write_table
+from coop_drake.campaign.runs import RunMaker
 from coop_drake.campaign.variation import Variation
-from coop_drake.errors import ProcessError
+from coop_drake.errors import CoopDrakeError
 from tests.support.processes import kill, processes, waited_for
 from tests.support.scenarios import write_scenario
 
@@ -42,7 +38,6 @@ runs:
 PATIENCE = 300.0
 """Longest that a command is waited for [s]; machines are busy where tests run."""
 
-CHILD = "coop_drake.campaign.running.child"
 PROGRAM = """
 import signal
 signal.signal(signal.SIGINT, signal.default_int_handler)  # It is ignored where tests run in the background.
@@ -114,17 +109,29 @@ def sorted_bytes(folder, campaign):
     return path.read_bytes()
 
 
-def child_of(folder, *, but=()):
-    """A process that makes runs for a folder, when there is one."""
-    return waited_for(lambda: [p for p in processes(CHILD, str(folder)) if p.pid not in but])[0]
+def worker_of(command, folder, *, but=()):
+    """The number of a worker of a command, when it makes runs."""
+    waited_for(lambda: any((folder.path / "attempts").glob("*")))
+    return waited_for(lambda: [pid for pid in workers_of(command) if pid not in but])[0]
+
+
+def workers_of(command):
+    """The processes that a command has started for its runs."""
+    return [p.pid for p in processes("multiprocessing.spawn", "spawn_main") if p.parent == command.pid]
+
+
+def gone(*pids):
+    """Whether processes have ended."""
+    return not {p.pid for p in processes()} & set(pids)
 
 
 def ended(command, folder, number):
     """End a command by a signal, and wait for all of its processes."""
+    pids = workers_of(command)
     command.send_signal(number)
     _, said = command.communicate(timeout=PATIENCE)
     assert (command.returncode, "leaked" in said) == (128 + number, False), said
-    waited_for(lambda: not processes(str(folder.path)))
+    waited_for(lambda: not processes(str(folder.path)) and gone(*pids))
 
 
 def test_a_campaign_that_is_disturbed_in_every_way_ends_as_one_that_is_not(undisturbed, begun):
@@ -139,17 +146,15 @@ def test_a_campaign_that_is_disturbed_in_every_way_ends_as_one_that_is_not(undis
     assert undisturbed.files(folder) == {}
 
     first = begun(folder.path, "--workers", 2)
-    child = child_of(folder.path)
-    kill(child.pid)
-    child = child_of(folder.path, but=[child.pid])
-    kill(child.parent)  # the worker, with which its process ends
-    waited_for(lambda: child.pid not in {p.pid for p in processes(CHILD)})
-    child_of(folder.path, but=[child.pid])
+    worker = worker_of(first, folder)
+    kill(worker)
+    waited_for(lambda: gone(worker))
+    worker_of(first, folder, but=[worker])
     ended(first, folder, signal.SIGINT)
     assert undisturbed.missing(folder)
 
     second = begun(folder.path, "--workers", 1)
-    child_of(folder.path)
+    worker_of(second, folder)
     beside = begun(folder.path)
     _, said = beside.communicate(timeout=PATIENCE)
     assert beside.returncode == 2
@@ -158,15 +163,15 @@ def test_a_campaign_that_is_disturbed_in_every_way_ends_as_one_that_is_not(undis
     assert undisturbed.missing(folder)
 
     third = begun(folder.path, "--workers", 1)
-    child_of(folder.path)
+    worker = worker_of(third, folder)
     kill(third.pid)
     third.communicate()
-    waited_for(lambda: not processes(str(folder.path)))
+    waited_for(lambda: not processes(str(folder.path)) and gone(worker))
     assert undisturbed.missing(folder)
 
     quick = {**os.environ, "DASK_DISTRIBUTED__SCHEDULER__WORKER_TTL": "5s"}
     last = begun(folder.path, "--json", "--workers", 2, env=quick)
-    hanging = child_of(folder.path).parent  # a worker again
+    hanging = worker_of(last, folder)
     kill(hanging, signal.SIGSTOP)
     said, _ = last.communicate(timeout=PATIENCE)
     kill(hanging)
@@ -191,7 +196,7 @@ def test_a_scheduler_of_the_users_own_may_be_killed(undisturbed, begun, tmp_path
     worker = subprocess.Popen(work, **own)
     try:
         command = begun(folder.path, "--scheduler", address)
-        child_of(folder.path)
+        waited_for(lambda: any((folder.path / "attempts").glob("*")))
         kill(scheduler.pid)
         _, said = command.communicate(timeout=PATIENCE)
         assert command.returncode == 1, said
@@ -204,82 +209,41 @@ def test_a_scheduler_of_the_users_own_may_be_killed(undisturbed, begun, tmp_path
     assert undisturbed.missing(folder)
 
 
-def test_a_process_that_hangs_is_ended_and_another_goes_on(undisturbed, tmp_path, monkeypatch):
-    timely, limits = supervising._timely, iter([2.0])
-    monkeypatch.setattr(supervising, "_START", 0.0)
-    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "temporary"))
-    (tmp_path / "temporary").mkdir()
-    monkeypatch.setattr(supervising, "_timely", lambda stream, limit: timely(stream, next(limits, limit)))
-    order = undisturbed.order(tmp_path / "hanging", time_limit=PATIENCE)  # of all processes but the first
-    stopping = threading.Thread(target=lambda: kill(child_of(order.folder).pid, signal.SIGSTOP))
-    stopping.start()
-    assert make_batch(order)
-    stopping.join()
-    folder = CampaignFolder(Path(order.folder))
-    assert folder.costs([order.batch])[0]["lost_processes"] >= 1
-    assert list((tmp_path / "temporary").iterdir()) == []
-    assert (folder.path / order.batch.file).read_bytes() == (
-        undisturbed.folder.path / order.batch.file
-    ).read_bytes()
+def fatal(folder, stop):
+    """A batch of work in which pieces hang and end their process, in a folder of its own."""
+    return CampaignFolder(folder), Batch(
+        0, "compiled", 0, stop, f"{stop:064}", "tests.support.fatal_work:WORK"
+    )
 
 
-def test_a_process_removes_its_files_when_what_started_it_has_ended(undisturbed, tmp_path):
-    (scratch := tmp_path / "scratch").mkdir()
-    told = {**asdict(undisturbed.order(tmp_path / "left")), "begin": 0, "scratch": str(scratch)}
-    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.DEVNULL}
-    with subprocess.Popen([sys.executable, "-m", CHILD, json.dumps(told)], **pipes) as process:
-        process.stdin.close()
-        assert process.wait(PATIENCE) == 1
-    assert not scratch.exists()
+def made(folder, batch, file):
+    options = {"workers": 1, "scheduler": None, "progress": None}
+    return make_batches(file, folder, (batch,), lambda missing: None, lambda batch: 1.0, **options)
 
 
-def test_a_run_that_ends_every_process_is_recorded_as_lost_and_the_others_are_made(
-    undisturbed, tmp_path, monkeypatch
+def test_pieces_that_hang_or_end_every_process_are_recorded_as_lost_and_the_others_are_made(
+    undisturbed, tmp_path
 ):
-    order = undisturbed.order(tmp_path / "fatal")
-    fatal, original = order.batch.first, supervising._lines
+    folder, batch = fatal(tmp_path / "fatal", 4)
+    assert made(folder, batch, undisturbed.file).made == 1
+    assert made(folder, batch, undisturbed.file).made == 0  # Its file is there.
+    rows = folder.table([batch]).to_pylist()
+    assert [row["arrived"] for row in rows] == [True, False, False, True]
+    said = "no result within 1 s, or the process was ended, 3 times"
+    assert [row["reason"] for row in rows] == ["", said, said, ""]
+    assert folder.costs([batch])[0]["lost_processes"] == 6
 
-    def lines(order, begin):
-        """As before, but that processes for the first run are killed when it has begun."""
-        for kind, content in original(order, begin):
-            if begin == fatal:
-                raise supervising._LostError("the process ended by signal SIGSEGV", begun_record)
-            yield kind, content
 
-    maker = RunMaker(undisturbed.variation, undisturbed.plans, "drake", tmp_path)
-    begun_record = maker.begun(undisturbed.variation.run(fatal))
-    monkeypatch.setattr(supervising, "_lines", lines)
-    assert make_batch(order)
-    assert not make_batch(order)  # Its file is there.
-    rows = CampaignFolder(Path(order.folder)).table([order.batch]).to_pylist()
-    assert [row["arrived"] for row in rows] == [False, True]
-    assert rows[0]["reason"] == "the process ended by signal SIGSEGV"
-    expected = undisturbed.folder.table([order.batch]).to_pylist()
-    assert {key: rows[1][key] for key in ("time", "steps", "funnel_margin")} == {
-        key: expected[1][key] for key in ("time", "steps", "funnel_margin")
-    }
+def test_a_disk_that_is_full_ends_the_command_and_loses_no_piece(undisturbed, tmp_path):
+    folder, batch = fatal(tmp_path / "full", 5)
+    with pytest.raises(OSError, match="the disk is full"):
+        made(folder, batch, undisturbed.file)
+    assert folder.missing([batch]) == [batch]
 
 
 def test_a_scenario_that_was_changed_meanwhile_is_not_run(undisturbed, tmp_path):
     order = undisturbed.order(tmp_path / "changed")
     changed = CampaignFolder(tmp_path / "changed").campaign
     changed.write_text(changed.read_text().replace("max: 0.1", "max: 0.2"))
-    with pytest.raises(ProcessError, match="was changed while the campaign ran"):
+    with pytest.raises(CoopDrakeError, match="was changed while the campaign ran"):
         make_batch(order)
-
-
-def test_a_log_that_cannot_be_written_ends_the_command_and_loses_no_run(undisturbed, tmp_path):
-    order = undisturbed.order(tmp_path / "kept")
-    folder = CampaignFolder(tmp_path / "kept")
-    file = undisturbed.file.with_name("kept.campaign.yaml")
-    file.write_text(FILE.replace("  vary:", "  keep: all\n  vary:"))
-    folder.campaign.write_bytes(file.read_bytes())
-    batch = next(Batching(Variation(load_campaign(file)), undisturbed.plans).batches())
-    order = replace(order, campaign=str(file), batch=batch)
-    (folder.path / "logs").write_text("no folder")
-    with pytest.raises(ProcessError, match="logs"):
-        make_batch(order)
-    assert not folder.has(batch)
-    (folder.path / "logs").unlink()
-    assert make_batch(order)
-    assert all(row["arrived"] for row in folder.table([batch]).to_pylist())

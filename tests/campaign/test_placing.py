@@ -3,7 +3,7 @@
 import dask
 import pytest
 
-from coop_drake.campaign.running.placing import client_of
+from coop_drake.campaign.execution import client_of
 
 
 @pytest.fixture(scope="module")

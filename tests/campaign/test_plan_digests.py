@@ -13,9 +13,9 @@ from benchmarks.searches.searching import Searching
 from benchmarks.study import load_study
 from coop_drake.answers.plan_file import plan_digest
 from coop_drake.campaign import plans
+from coop_drake.campaign.file import load_campaign
 from coop_drake.campaign.plans import Plans, _planned, scenario_content
-from coop_drake.campaign.results import CampaignFolder
-from coop_drake.campaign.settings import load_campaign
+from coop_drake.campaign.records import CampaignFolder
 from coop_drake.campaign.variation import Variation
 from coop_drake.scenario.load import load_scenario
 from tests.support.cli import invoke

@@ -12,9 +12,9 @@ import yaml
 from typer.testing import CliRunner
 
 from benchmarks.app import app
+from coop_drake.campaign.file import load_campaign
 from coop_drake.campaign.plans import Plans
-from coop_drake.campaign.running.making import RunMaker
-from coop_drake.campaign.settings import load_campaign
+from coop_drake.campaign.runs import RunMaker
 from coop_drake.campaign.variation import Variation
 from coop_drake.cli.reporter import Reporter
 from tests.support.cli import invoke

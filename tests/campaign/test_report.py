@@ -10,11 +10,17 @@ import pytest
 from scipy.stats import beta, binom
 
 from coop_drake.campaign.records import RunRecord, table_of
-from coop_drake.campaign.report import make_report, write_report
-from coop_drake.campaign.report.distributions import distribution
-from coop_drake.campaign.report.figures import distributions_svg
-from coop_drake.campaign.report.page import headline, render_page, verdict
-from coop_drake.campaign.report.rates import loss_rate, percent_up
+from coop_drake.campaign.report import (
+    distribution,
+    distributions_svg,
+    headline,
+    loss_rate,
+    make_report,
+    percent_up,
+    render_page,
+    verdict,
+    write_report,
+)
 from tests.support.campaign_table import run_table
 
 

@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 from pydrake.common import schema
 
-from coop_drake.campaign import distributions
-from coop_drake.campaign.settings import load_campaign
+from coop_drake.campaign import file as distributions
+from coop_drake.campaign.file import load_campaign
 from coop_drake.campaign.variation import Variation
 from coop_drake.errors import ScenarioError
 

@@ -4,10 +4,10 @@ from dataclasses import asdict, replace
 
 import pytest
 
+from coop_drake.campaign.file import load_campaign
 from coop_drake.campaign.plans import Plans
 from coop_drake.campaign.records import RunRecord
-from coop_drake.campaign.running.making import RunMaker
-from coop_drake.campaign.settings import load_campaign
+from coop_drake.campaign.runs import RunMaker
 from coop_drake.campaign.variation import Variation
 from coop_drake.cli.campaign import _compare, _show_both
 from coop_drake.cli.reporter import Reporter

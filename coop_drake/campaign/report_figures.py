@@ -11,8 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from coop_drake.campaign.report.columns import MEASURES, SHARE, Measure
-from coop_drake.campaign.report.distributions import Distribution, Group
+from coop_drake.campaign.report import MEASURES, SHARE, Distribution, Group, Measure
 from coop_drake.drawing.canvas import house_style, picture_of
 from coop_drake.drawing.colours import BLUE, GREY, INK, ORANGE, VERMILLION
 
