@@ -58,12 +58,14 @@ _SETTINGS = {
             "profile": {"enabled": False},
             "memory": {"target": False, "spill": False, "pause": False, "terminate": 0.95},
         },
+        "deploy": {"lost-worker-timeout": "1h"},
         "admin": {"tick": {"interval": "500ms"}, "system-monitor": {"interval": "5s"}},
     }
 }
 """A batch is tried again when its worker was lost, and given to another worker after a minute at most in
 which its own was silent: Dask looks every half minute which workers have been silent for as long. Drake keeps
-17 MB of a hundred runs: a worker that has no memory left is ended and another one started. Dask's
+17 MB of a hundred runs: a worker that has no memory left is ended and another one started. A nanny is not
+given up because the worker that it starts is lost once more before Dask looks, after 15 s by default. Dask's
 measurements of itself are off or rare: scheduler and two workers would use a seventh of a core for them. The
 user's own settings in Dask's configuration stand above these where they differ from Dask's defaults."""
 

@@ -175,9 +175,9 @@ class Runs:
         paired: With ``compiled``, how many of the first runs of every scenario Drake's loop makes, too.
         budget: Under which budget the plans must hold, as ``plan --budget`` takes it; null for what the
             scenarios require.
-        batch: Runs of one process and one file; null for 20 of Drake's loop, 2000 of the compiled one.
-        time_limit: Longest time for each run of a process; ten minutes more for the first one, which may
-            compile kernels [s].
+        batch: Runs of one task and one file; null for 20 of Drake's loop, 2000 of the compiled one.
+        time_limit: Longest time for each run; ten minutes more for the first one of a batch, which may compile
+            kernels [s].
         keep: Of which of Drake's runs the log is kept.
     """
 
@@ -195,7 +195,7 @@ class Runs:
     keep: Literal["none", "lost", "all"] = "none"
 
     def batch_of(self, tier: Tier) -> int:
-        """Runs of a batch of a tier: with a process of its own it takes a minute or so."""
+        """Runs of a batch of a tier: it takes a minute or so."""
         return self.batch or {"drake": 20, "compiled": 2000}[tier]
 
     def __post_init__(self) -> None:

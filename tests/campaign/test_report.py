@@ -12,7 +12,6 @@ from scipy.stats import beta, binom
 from coop_drake.campaign.records import RunRecord, table_of
 from coop_drake.campaign.report import (
     distribution,
-    distributions_svg,
     headline,
     loss_rate,
     make_report,
@@ -21,6 +20,7 @@ from coop_drake.campaign.report import (
     verdict,
     write_report,
 )
+from coop_drake.campaign.report_figures import distributions_svg
 from tests.support.campaign_table import run_table
 
 
