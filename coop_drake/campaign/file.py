@@ -176,8 +176,8 @@ class Runs:
         budget: Under which budget the plans must hold, as ``plan --budget`` takes it; null for what the
             scenarios require.
         batch: Runs of one task and one file; null for 20 of Drake's loop, 2000 of the compiled one.
-        time_limit: Longest time for each run; ten minutes more for the first one of a batch, which may compile
-            kernels [s].
+        time_limit: Longest time for each run; ten minutes more for the first one of a batch, which may
+            compile kernels [s].
         keep: Of which of Drake's runs the log is kept.
     """
 
