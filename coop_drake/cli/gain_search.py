@@ -23,8 +23,8 @@ from coop_drake.tuning import (
     Limit,
     Objective,
     Parameter,
-    RunOutcome,
     Search,
+    TrialOutcome,
     TrialRunner,
     Workers,
     read_weights,
@@ -184,7 +184,9 @@ def _write_trials(found: Search, path: Path) -> Path:
     return write_atomically(path, json.dumps(document, indent=1).encode() + b"\n")
 
 
-def _show(reporter: Reporter, title: str, found: Search, after: RunOutcome, anew: RunOutcome | None) -> None:
+def _show(
+    reporter: Reporter, title: str, found: Search, after: TrialOutcome, anew: TrialOutcome | None
+) -> None:
     """Show every criterion before and after, and note the values."""
     before = found.objective.before
     rows = []

@@ -6,7 +6,7 @@ from coop_drake.tuning.objective import (
     GainTrial,
     Limit,
     Objective,
-    RunOutcome,
+    TrialOutcome,
     read_weights,
 )
 from coop_drake.tuning.search import Parameter, Search, TrialRunner, Workers, search, tunable_parameters
@@ -18,8 +18,8 @@ __all__ = [
     "Limit",
     "Objective",
     "Parameter",
-    "RunOutcome",
     "Search",
+    "TrialOutcome",
     "TrialRunner",
     "Workers",
     "read_weights",

@@ -107,7 +107,7 @@ CRITERIA = {
 
 
 @dataclass(frozen=True)
-class RunOutcome:
+class TrialOutcome:
     """Result of a simulated run.
 
     Attributes:
@@ -123,12 +123,12 @@ class RunOutcome:
     violation: str
 
 
-def outcome_of(log: SimulationLog, cells: int) -> RunOutcome:
+def outcome_of(log: SimulationLog, cells: int) -> TrialOutcome:
     """Measure a run of a plan with so many cells by every criterion."""
     arrived = log.reached and not log.violation
     done = 1.0 if arrived else float(log.cell_index[-1]) / cells
     values = {name: criterion.measure(log) for name, criterion in CRITERIA.items()}
-    return RunOutcome(arrived, done, values, log.violation)
+    return TrialOutcome(arrived, done, values, log.violation)
 
 
 @dataclass(frozen=True)
@@ -142,7 +142,7 @@ class GainTrial:
     """
 
     gains: GainSet
-    outcome: RunOutcome
+    outcome: TrialOutcome
     loop: Literal["drake", "compiled"] = "drake"
 
 
@@ -230,11 +230,11 @@ class Objective:
     limits: tuple[Limit, ...]
     before: Mapping[str, float]
 
-    def kept(self, outcome: RunOutcome) -> bool:
+    def kept(self, outcome: TrialOutcome) -> bool:
         """Whether a run arrived and kept every limit."""
         return outcome.arrived and not any(limit.excess(outcome.values, self.before) for limit in self.limits)
 
-    def score(self, outcome: RunOutcome) -> float:
+    def score(self, outcome: TrialOutcome) -> float:
         """Return the weighted mean of all criteria, each divided by its value before tuning.
 
         The run before tuning scores 1. A run that breaks a limit scores more than all that keep them, a

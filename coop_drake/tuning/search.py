@@ -27,7 +27,7 @@ from coop_drake.planning.planner import plan
 from coop_drake.scenario import Scenario, load_scenario
 from coop_drake.simulation import build_maps, simulate
 from coop_drake.tree.pose import FloatArray
-from coop_drake.tuning.objective import CRITERIA, GainTrial, Objective, RunOutcome, outcome_of
+from coop_drake.tuning.objective import CRITERIA, GainTrial, Objective, TrialOutcome, outcome_of
 
 # Trials of gain sets: a plan is run with other gains, by the compiled loop where it knows the team.
 #
@@ -73,7 +73,7 @@ class TrialRunner:
         values = {name: getattr(found, name) for name in CRITERIA}
         values = {name: value if isfinite(value) else 0.0 for name, value in values.items()}  # without joints
         done = 1.0 if found.arrived else found.cell / len(self.plan.cells)
-        return GainTrial(gains, RunOutcome(found.arrived, done, values, found.reason), "compiled")
+        return GainTrial(gains, TrialOutcome(found.arrived, done, values, found.reason), "compiled")
 
     @cached_property
     def _transport(self) -> CompiledTransport | None:
@@ -89,7 +89,7 @@ class TrialRunner:
             return None
         return transport
 
-    def replan(self, problem: PlanningProblem, gains: GainSet) -> RunOutcome | None:
+    def replan(self, problem: PlanningProblem, gains: GainSet) -> TrialOutcome | None:
         """Plan again with other gains, which may give other cells, and simulate; None if no plan is found."""
         result = plan(problem, gains, gain_set_name="trial")
         if not isinstance(result, Found):

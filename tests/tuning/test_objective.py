@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from coop_drake.errors import TuningError
-from coop_drake.tuning import CRITERIA, Limit, Objective, RunOutcome, read_weights
+from coop_drake.tuning import CRITERIA, Limit, Objective, TrialOutcome, read_weights
 from coop_drake.tuning.objective import outcome_of
 from tests.support.cases import case
 from tests.support.synthetic_log import SECONDS, synthetic_log
@@ -17,7 +17,7 @@ BEFORE = {"time": 20.0, "peak_force": 100.0, "clearance": 0.1}
 
 
 def outcome(*, arrived=True, fraction_done=1.0, **values):
-    return RunOutcome(arrived, fraction_done, {**BEFORE, **values}, "" if arrived else "stalled")
+    return TrialOutcome(arrived, fraction_done, {**BEFORE, **values}, "" if arrived else "stalled")
 
 
 def test_criteria_are_read_from_the_run():

@@ -11,7 +11,7 @@ import pytest
 
 from coop_drake.errors import TuningError
 from coop_drake.laws import FixedGains, ScheduledGains
-from coop_drake.tuning import GainTrial, Objective, RunOutcome, search, tunable_parameters
+from coop_drake.tuning import GainTrial, Objective, TrialOutcome, search, tunable_parameters
 from coop_drake.tuning.search import to_fractions, with_fractions
 
 SETS = [ScheduledGains(), FixedGains()]
@@ -21,7 +21,7 @@ def bowl(gains):
     """A make-believe run: forces are least at an age phase of 0.5 and a funnel acceleration of 10."""
     away = log(gains.age_phase / 0.5) ** 2 + log(gains.funnel_acceleration / 10.0) ** 2
     values = {"time": 10.0, "peak_force": 100.0 * (1.0 + away)}
-    return GainTrial(gains, RunOutcome(True, 1.0, values, ""))
+    return GainTrial(gains, TrialOutcome(True, 1.0, values, ""))
 
 
 def one_by_one(gain_sets):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from coop_drake.laws import ScheduledGains
-from coop_drake.tuning import CRITERIA, GainTrial, Limit, Objective, RunOutcome, Search
+from coop_drake.tuning import CRITERIA, GainTrial, Limit, Objective, Search, TrialOutcome
 from coop_drake.viz.tuning_figure import tuning_figure
 
 BEFORE = dict.fromkeys(CRITERIA, 1.0) | {"time": 20.0, "peak_force": 200.0}
@@ -14,7 +14,7 @@ BEFORE = dict.fromkeys(CRITERIA, 1.0) | {"time": 20.0, "peak_force": 200.0}
 
 def trial(time, force, *, arrived=True):
     values = BEFORE | {"time": time, "peak_force": force} if arrived else {}
-    return GainTrial(ScheduledGains(), RunOutcome(arrived, float(arrived), values, ""))
+    return GainTrial(ScheduledGains(), TrialOutcome(arrived, float(arrived), values, ""))
 
 
 @pytest.fixture
