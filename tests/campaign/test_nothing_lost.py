@@ -111,9 +111,13 @@ def sorted_bytes(folder, campaign):
 
 
 def worker_of(folder, *, but=()):
-    """The number of a worker of a command, when it makes runs."""
-    waited_for(lambda: any((folder.path / "attempts").glob("*")))
-    return waited_for(lambda: [pid for pid in workers_of(folder) if pid not in but])[0]
+    """The number of a worker of a command, when it makes runs; what earlier workers tried is gone by then."""
+
+    def found():
+        pids = [pid for pid in workers_of(folder) if pid not in but]
+        return pids if any((folder.path / "attempts").glob("*")) else []
+
+    return waited_for(found)[0]
 
 
 def workers_of(folder):
