@@ -321,8 +321,10 @@ def client_of(workers: int | None, scheduler: str | None) -> Iterator[Client]:
         with ended_by_signals(), cluster, client:
             try:
                 yield client
-            finally:  # Dask would wait for batches that are being made.
-                for process in [worker.pid for worker in cluster.workers.values() if worker.pid]:
+            finally:  # Dask would wait for batches that are being made, and nannies start new workers.
+                for nanny in cluster.workers.values():
+                    nanny.close_gracefully()
+                for process in [nanny.pid for nanny in cluster.workers.values() if nanny.pid]:
                     with suppress(ProcessLookupError):
                         os.kill(process, signal.SIGKILL)
 
