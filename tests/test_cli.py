@@ -256,6 +256,7 @@ def test_a_live_run_may_wait_for_a_browser_as_long_as_it_takes(finished, room, t
     assert "live_url" in json.loads(result.stdout)
 
 
+@pytest.mark.slow
 def test_warming_up_leaves_nothing_behind(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     result = invoke("doctor", "--warm")

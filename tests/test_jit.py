@@ -106,6 +106,7 @@ def test_an_edit_of_a_callee_of_its_constants_or_named_tuples_compiles_the_calle
     assert len(versions) == 3, "old machine code is removed"
 
 
+@pytest.mark.slow
 def test_machine_code_goes_where_the_user_says_or_to_the_user_s_cache_or_is_not_kept(folder):
     assert run(folder, NUMBA_CACHE_DIR=str(folder / "named")) == ["6.75", "0"]
     assert run(folder, NUMBA_CACHE_DIR=str(folder / "named")) == ["6.75", "1"]
@@ -117,6 +118,7 @@ def test_machine_code_goes_where_the_user_says_or_to_the_user_s_cache_or_is_not_
     ] * 2
 
 
+@pytest.mark.slow
 def test_damaged_machine_code_is_replaced(folder):
     run(folder)
     for kind, damage in (("nbi", b"no pickle"), ("nbc", b"")):
@@ -126,6 +128,7 @@ def test_damaged_machine_code_is_replaced(folder):
     assert run(folder) == ["6.75", "1"]
 
 
+@pytest.mark.slow
 def test_machine_code_for_other_types_under_the_name_of_a_file_is_not_called(folder):
     """As where two processes write at the same time: the index of one, the machine code of the other."""
     run(folder, "2.0")
@@ -140,6 +143,7 @@ def test_machine_code_for_other_types_under_the_name_of_a_file_is_not_called(fol
     assert run(folder, "2.0") == ["6.75", "0"]
 
 
+@pytest.mark.slow
 def test_processes_that_compile_at_the_same_time_do_no_harm(folder):
     kinds = ("2.0", "2"), ("2", "2.0"), ("True", "2.0")
     processes = [start(folder, *numbers) for numbers in kinds]
