@@ -11,7 +11,7 @@ import pytest
 from coop_drake.answers import load_plan, save_plan
 from coop_drake.answers.log import SimulationLog
 from coop_drake.cli import simulate
-from coop_drake.simulation import watch
+from coop_drake.simulation import run
 from tests.support.cli import invoke
 from tests.support.no_drawings import NoDrawings
 from tests.support.scenarios import write_scenario
@@ -30,8 +30,8 @@ def planned(tmp_path_factory):
 
 @pytest.fixture(autouse=True)
 def impatient(monkeypatch):
-    monkeypatch.setattr(watch, "PATIENCE_FACTOR", 1.0)
-    monkeypatch.setattr(watch, "PATIENCE_ALLOWANCE", 0.5)
+    monkeypatch.setattr(run, "PATIENCE_FACTOR", 1.0)
+    monkeypatch.setattr(run, "PATIENCE_ALLOWANCE", 0.5)
     monkeypatch.setattr(simulate, "DrawingProcesses", NoDrawings)
 
 

@@ -37,7 +37,8 @@ def read_wkt(path: Path, settings: FloorPlanSettings) -> Drawing:
     try:
         geometry = shapely.from_wkt(text)
     except (shapely.GEOSException, ValueError) as error:
-        finding = f"no well-known text ({' '.join(str(error).split())})"
+        said = "".join(c if c.isprintable() else repr(c)[1:-1] for c in " ".join(str(error).split()))
+        finding = f"no well-known text ({said})"
         raise FloorPlanError(
             file, "the text", finding, "write one geometry, for example POLYGON ((0 0, 9 0, 9 5, 0 0))"
         ) from error

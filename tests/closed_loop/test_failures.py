@@ -7,7 +7,7 @@ import pytest
 from shapely import box
 
 from coop_drake.answers.plan import Plan
-from coop_drake.simulation import simulate, watch
+from coop_drake.simulation import run, simulate
 from tests.support.small_loop import small_maps, small_problem
 from tests.support.small_plan import ROOM
 from tests.support.small_scenario import small_scenario
@@ -75,7 +75,7 @@ def test_a_clearance_that_is_too_small_for_the_energy_is_a_violation(problem):
 
 
 def test_a_cell_that_is_never_left_stalls_and_names_what_blocks(problem, monkeypatch):
-    monkeypatch.setattr(watch, "PATIENCE_ALLOWANCE", 0.5)
+    monkeypatch.setattr(run, "PATIENCE_ALLOWANCE", 0.5)
     scenario, plan = problem
     shut = replace(plan.transitions[1].gains, energy_bound=np.zeros(3))
     never = with_transition(with_transition(plan, 1, gains=shut), 0, estimated_time=0.1)
@@ -88,7 +88,7 @@ def test_a_cell_that_is_never_left_stalls_and_names_what_blocks(problem, monkeyp
 
 
 def test_a_next_cell_out_of_reach_is_named_as_what_blocks(problem, monkeypatch):
-    monkeypatch.setattr(watch, "PATIENCE_ALLOWANCE", 0.5)
+    monkeypatch.setattr(run, "PATIENCE_ALLOWANCE", 0.5)
     scenario, plan = problem
     away = with_cell(plan, 1, tidied=box(8.0, 5.0, 9.0, 6.0))
     log = simulate(scenario, with_transition(away, 0, estimated_time=0.1), small_maps())

@@ -21,7 +21,7 @@ from coop_drake.scenario import (
     RobotDepartures,
     Silence,
 )
-from coop_drake.scenario.checks import check_deployment
+from coop_drake.scenario.checks import validate
 from coop_drake.simulation import configure_simulator
 from tests.support.small_loop import small_maps, small_problem
 from tests.support.small_scenario import small_scenario
@@ -190,7 +190,7 @@ def test_friction_of_joints_is_refused_where_it_cannot_be_simulated():
         plant=PlantSettings(grasps="constraints"),
     )
     with pytest.raises(ScenarioError) as refused:
-        check_deployment(scenario, ("robot_0", "robot_1"))
+        validate(scenario)
     assert refused.value.key == "deployment.joint_friction"
 
 

@@ -98,6 +98,6 @@ def test_all_commands_hand_their_reporter_to_the_reader():
         for node in ast.walk(ast.parse(file.read_text()))
         if isinstance(node, ast.Call) and getattr(node.func, "id", "") == "read_task"
     ]
-    assert len(calls) >= 11
+    assert len(calls) >= 10
     for call in calls:
         assert len(call.args) == 3 or [word.arg for word in call.keywords] == ["reporter"], ast.unparse(call)
