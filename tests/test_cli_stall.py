@@ -14,18 +14,17 @@ from coop_drake.cli import simulate
 from coop_drake.simulation import run
 from tests.support.cli import invoke
 from tests.support.no_drawings import NoDrawings
-from tests.support.scenarios import write_scenario
+from tests.support.scenarios import TWO_ROOMS, write_scenario
 
 
 @pytest.fixture(scope="module")
 def planned(tmp_path_factory):
     """A scenario and its plan, of more than one cell."""
     folder = tmp_path_factory.mktemp("stall")
-    goal = {"object": {"x": 3.2, "y": 2.2, "theta": 0.9}}
-    room = write_scenario(folder / "room.scenario.yaml", goal=goal)
+    room = write_scenario(folder / "room.scenario.yaml", **TWO_ROOMS)
     assert invoke("plan", room, "--out", folder).exit_code == 0
     assert len(load_plan(folder / "plan.json").cells) > 1
-    return room, folder / "plan.json", goal
+    return room, folder / "plan.json"
 
 
 @pytest.fixture(autouse=True)
@@ -48,7 +47,7 @@ def assert_stalled(result, out, complaint):
 
 
 def test_an_energy_that_no_axis_can_fall_below_is_named(planned, tmp_path):
-    room, path, _ = planned
+    room, path = planned
     plan = load_plan(path)
     first, second, *others = plan.transitions
     shut = replace(second.gains, energy_bound=np.full_like(second.gains.energy_bound, 1e-12))
@@ -59,9 +58,9 @@ def test_an_energy_that_no_axis_can_fall_below_is_named(planned, tmp_path):
 
 
 def test_reports_that_never_arrive_are_named(planned, tmp_path):
-    _, path, goal = planned
+    _, path = planned
     deployment = {"control_rate": 100.0, "messages": {"loss": 1.0}}
-    deaf = write_scenario(tmp_path / "deaf.scenario.yaml", goal=goal, deployment=deployment)
+    deaf = write_scenario(tmp_path / "deaf.scenario.yaml", **TWO_ROOMS, deployment=deployment)
     result = invoke("simulate", deaf, "--plan", path, "--out", tmp_path, "--json")
     assert_stalled(
         result,

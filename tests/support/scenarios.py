@@ -22,6 +22,16 @@ ROOM = {
     "goal": {"object": {"x": 3.2, "y": 2.2, "theta": 0.1}},
 }
 
+TWO_ROOMS = {
+    "workspace": {
+        "outer": [[0, 0], [5, 0], [5, 1.1], [5.4, 1.1], [5.4, 0], [10, 0],
+                  [10, 4], [5.4, 4], [5.4, 2.9], [5, 2.9], [5, 4], [0, 4]],
+    },
+    "start": {"object": {"x": 2.5, "y": 2.0, "theta": 1.0}, "joints": {"robot_0": [0.0], "robot_1": [0.0]}},
+    "goal": {"object": {"x": 7.5, "y": 2.0, "theta": 1.5}},
+}  # fmt: skip
+"""Sections with a door through which the team goes without turning: it turns before and behind it."""
+
 
 def write_scenario(path: Path, **sections: object) -> Path:
     """Write a scenario in which two robots move the object a little way in an empty room.

@@ -11,7 +11,7 @@ from coop_drake.laws.axis_table import axis_table, bounds_of, track_row
 from coop_drake.verification.budget import check_budget
 from coop_drake.verification.runs.budget import commanded
 from tests.support.cli import invoke
-from tests.support.scenarios import write_scenario
+from tests.support.scenarios import TWO_ROOMS, write_scenario
 
 BUDGET = """
 control_rate: 200
@@ -25,19 +25,10 @@ report_age: 0.01
 """
 
 
-DOOR = [
-    [0, 0], [5, 0], [5, 1.1], [5.4, 1.1], [5.4, 0], [10, 0],
-    [10, 4], [5.4, 4], [5.4, 2.9], [5, 2.9], [5, 4], [0, 4],
-]  # fmt: skip
-"""Two rooms with a door through which the team goes without turning: it turns before and behind it."""
-
-
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     folder = tmp_path_factory.mktemp("budget")
-    goal = {"object": {"x": 7.5, "y": 2.0, "theta": 1.5}}
-    start = {"object": {"x": 2.5, "y": 2.0, "theta": 1.0}, "joints": {"robot_0": [0.0], "robot_1": [0.0]}}
-    write_scenario(folder / "room.scenario.yaml", start=start, goal=goal, workspace={"outer": DOOR})
+    write_scenario(folder / "room.scenario.yaml", **TWO_ROOMS)
     (folder / "budget.yaml").write_text(BUDGET)
     result = invoke(
         "plan", folder / "room.scenario.yaml", "--budget", folder / "budget.yaml", "--out", folder
