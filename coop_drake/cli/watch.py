@@ -67,7 +67,7 @@ def watch_command(
             metavar="M",
             min=0.0,
             callback=_checked_margin,
-            help="Distance to keep from walls in metres. Only with 0, the default of cells, is 'no path' a proof.",
+            help="Metres to keep from walls. Only with 0, the default of cells, is 'no path' a proof.",
         ),
     ] = None,
     machine: Machine = False,
