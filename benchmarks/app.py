@@ -16,7 +16,6 @@ from benchmarks.adversaries.measured import adversary_tasks
 from benchmarks.alarms import alarm_tasks
 from benchmarks.apart import apart_tasks, stops_tasks
 from benchmarks.breaking import breaking_tasks
-from benchmarks.campaign_costs import campaign_tasks
 from benchmarks.commands import bench_commands, starting_tasks
 from benchmarks.compiled_runs import compiled_tasks
 from benchmarks.departures import departure_tasks
@@ -194,7 +193,6 @@ def _tasks(effort: Effort) -> list[Task]:
         *rejoining_tasks(),
         *limp_tasks(),
         *stops_tasks(),
-        *campaign_tasks(),
     ]
 
 

@@ -86,7 +86,6 @@ TOPICS = {
     "breaking": "departures that an axis bears, by a search for the worst, beside those that are certified",
     "alarms": "levels of monitors: 400 certified runs of each shipped transport; the chance of false alarms",
     "apart": "processes of their own: cost of messages and of 2, 4 and 8 robots; kills; limp robots; stops",
-    "campaign": "campaigns: the scheduler, processes, files, two workers, memory of a worker over 2,000 runs",
     "adversaries": "altered plans and proofs beside the exact checker; how long it checks random answers",
 }
 """What every topic is about."""
