@@ -360,7 +360,11 @@ class WidenedFloor:
         return shapely.union(shapely.difference(grown, self._middle_lines(amount)), self._workspace)
 
     def _middle_lines(self, amount: float) -> BaseGeometry:
-        """What is left of the walls' middle lines when walls and their ends have moved."""
+        """The walls' middle lines, shortened where the ends of walls recede by more than half a wall.
+
+        Args:
+            amount: How far walls move back [m].
+        """
         lines, ends = self._spine
         receded = [end.buffer(amount - half) for end, half in ends if amount > half]
         left = shapely.difference(lines, shapely.union_all(receded)) if receded else lines

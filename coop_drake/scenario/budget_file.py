@@ -232,7 +232,7 @@ def wave_bounds(waves: Waves, tree: ComponentTree) -> MeasuredBounds:
 
 
 def rate_levers(tree: ComponentTree) -> float:
-    """Return the error of the object's velocity over that of the rates of a robot, by which it is known [-].
+    """Return the object's velocity error [m/s] for a unit error of all rates that a robot measures.
 
     The velocity of the base counts once, that of every angle by its largest distance from the object; their
     errors are independent.
