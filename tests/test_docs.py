@@ -19,7 +19,7 @@ from docs.generate.__main__ import PAGES
 from docs.generate.api_pages import api_pages
 from docs.generate.links import first_page, for_site
 from docs.generate.port_tables import as_markdown
-from docs.generate.scenario_keys import sections
+from docs.generate.scenario_page import sections
 from tests.support.small_loop import joint_names, small_maps, small_scenario
 from tests.support.small_plan import small_plan
 

@@ -6,8 +6,6 @@ import ast
 from pathlib import Path
 from typing import NamedTuple
 
-__all__ = ["ApiPage", "api_pages"]
-
 
 class ApiPage(NamedTuple):
     """One page.

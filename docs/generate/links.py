@@ -5,8 +5,6 @@ from __future__ import annotations
 import re
 from pathlib import PurePosixPath
 
-__all__ = ["first_page", "for_site"]
-
 _OUTSIDE = re.compile(r"(?<!!)\[([^\]]+)\]\((?!https?:|docs/)[^)]+\)")
 _PACKAGE = re.compile(r"\]\((?:\.\./)+coop_drake/(\w+)\)")
 

@@ -29,8 +29,6 @@ from coop_drake.apart.robot import LONGEST_DOUBT
 from coop_drake.laws.actuators import BASE_RATE, JOINT_DAMPING, RETURN_RATE, TURN_RATE
 from coop_drake.systems.messages import robot_record
 
-__all__ = ["message_page"]
-
 _SECTIONS = (
     (
         "Sessions",
@@ -169,13 +167,9 @@ and `Status`. It ends the run by `Goodbye`.
 
 
 def _reasons() -> str:
-    lines = [
-        "## What is refused",
-        "",
-        "A message that departs from this page is refused and counted under one of these reasons. The\n"
-        "process says on standard error what is wrong with the first malformed one.",
-        "",
-        *(f"- **{reason.name.lower()}**: {reason.value}" for reason in Reason),
-        "",
-    ]
-    return "\n".join(lines)
+    return f"""## What is refused
+
+A message that departs from this page is refused and counted under one of these reasons. The
+process says on standard error what is wrong with the first malformed one.
+
+{"".join(f"- **{reason.name.lower()}**: {reason.value}{chr(10)}" for reason in Reason)}"""

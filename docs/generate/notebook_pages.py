@@ -11,8 +11,6 @@ from typing import Any
 
 import nbformat
 
-__all__ = ["write_notebook_pages"]
-
 _FRAME = re.compile(r'<iframe srcdoc="(.*?)" width="100%" height="(\d+)"', re.DOTALL)
 _COLOURS = re.compile(r"\x1b\[[0-9;]*m")
 _PICTURES = {"image/svg+xml": "svg", "image/png": "png"}

@@ -7,8 +7,6 @@ from typing import Any
 
 from griffe import Extension, Object
 
-__all__ = ["PortTables", "as_markdown"]
-
 _RULER = re.compile(r"^\s*=+( +=+)+\s*$")
 _HEADS = ("", "port", "size", "meaning", "frame")
 

@@ -1,14 +1,19 @@
-"""The pages of scenario files and of campaign files."""
+"""The pages of scenario files and of campaign files, from the dataclasses that hold every key."""
 
 from __future__ import annotations
 
+import dataclasses
+import inspect
+import json
 import re
+import typing
 from collections.abc import Iterable, Iterator
+from typing import Any, NamedTuple
 
 from coop_drake.campaign.file import Campaign
-from docs.generate.scenario_keys import ScenarioKey, Section, sections
-
-__all__ = ["campaign_page", "scenario_page"]
+from coop_drake.scenario.json_schema import field_meanings
+from coop_drake.scenario.model import Scenario
+from coop_drake.typed_data import FieldType, classes_by_tag, describe, field_types
 
 _TOP = """# Scenario files
 
@@ -25,6 +30,24 @@ A campaign is one YAML file that ends in `.campaign.yaml`; [how to run one](../h
 brackets stand the unit, what a key may be, and its default. `make docs` makes this page from the classes that
 hold the values.
 """
+
+
+class ScenarioKey(NamedTuple):
+    """One key; its type and limits in words, its unit and its default, which may be empty."""
+
+    name: str
+    kind: str
+    unit: str
+    default: str
+    meaning: str
+
+
+class Section(NamedTuple):
+    """The keys of one class, at a path in the file that is empty for the file itself."""
+
+    path: str
+    about: str
+    keys: tuple[ScenarioKey, ...]
 
 
 def scenario_page() -> str:
@@ -89,3 +112,53 @@ def _short(kind: str) -> str:
     for words, shorter in _SHORTER:
         kind = re.sub(words, shorter, kind)
     return "" if kind == "true or false" else kind
+
+
+def sections(cls: Any = Scenario, path: str = "") -> Iterator[Section]:
+    """Yield the section of a class, and those inside it, from the top down.
+
+    Args:
+        cls: A dataclass that is read from scenario files.
+        path: Its key in the file.
+    """
+    meanings = field_meanings(cls)
+    keys = []
+    for name, field in field_types(cls).items():
+        unit, meaning = _unit_apart(meanings[name])
+        keys.append(ScenarioKey(name, describe(field.kind, brief=True), unit, _default(field), meaning))
+    yield Section(path, (inspect.getdoc(cls) or "").split("\n\n")[0], tuple(keys))
+    for name, field in field_types(cls).items():
+        place = f"{path}.{name}" if path else name
+        for part in (field.kind, *typing.get_args(field.kind)):
+            for tag, inner in classes_by_tag(part).items():
+                yield from sections(inner, f"{place}.NAME: {tag}")
+        if dataclasses.is_dataclass(field.kind):
+            yield from sections(field.kind, place)
+        yield from _inner_sections(field.kind, place)
+
+
+def _inner_sections(kind: Any, place: str) -> Iterator[Section]:
+    """Yield the sections of entries of mappings and lists, and of values that may be null."""
+    suffix = {dict: ".NAME", tuple: "[]"}.get(typing.get_origin(kind), "")
+    for part in typing.get_args(kind):
+        if isinstance(part, type) and dataclasses.is_dataclass(part) and not classes_by_tag(kind):
+            yield from sections(part, place + suffix)
+
+
+def _unit_apart(meaning: str) -> tuple[str, str]:
+    """Return the unit in brackets, and the sentence without it."""
+    found = re.search(r" ?\[([^\]]+)\]", meaning)
+    if found is None:
+        return "", meaning
+    return found.group(1), meaning.replace(found.group(0), "", 1)
+
+
+def _default(field: FieldType) -> str:
+    value = field.default
+    if value is dataclasses.MISSING:
+        return ""
+    if dataclasses.is_dataclass(value):
+        return "see below"
+    if value is None or isinstance(value, bool) or value == ():
+        return json.dumps(value)
+    return str(value)
