@@ -1,24 +1,39 @@
 """Random questions are the same for the same seed and begin without collision; answers are judged fairly."""
 
 import json
-from dataclasses import replace
+from dataclasses import asdict, replace
 from math import isnan, nan
 
 import numpy as np
 import pytest
 import shapely
 from shapely import box
+from typer.testing import CliRunner
 
+from benchmarks.app import app
 from benchmarks.questions import answering
-from benchmarks.questions.answering import QuestionRecord, answer, ask, sampled_margin
+from benchmarks.questions.answering import (
+    CASES,
+    MEASURED,
+    QuestionRecord,
+    answer,
+    ask,
+    question_batches,
+    sampled_margin,
+)
 from benchmarks.questions.floors import FLOORS, random_floor
 from benchmarks.questions.peers import Searched, fault_of, search_by_peers
 from benchmarks.questions.question import narrowest_corridor, random_question
 from benchmarks.questions.settings import QuestionSettings
+from benchmarks.questions.summary import summarise_questions
 from benchmarks.questions.teams import SHAPES, random_count, random_team
+from benchmarks.study import Results, Study, batches_of, load_study
 from coop_drake.answers import Found, Infeasible, Undecided
 from coop_drake.answers.plan import SearchReport
 from coop_drake.answers.problem import at_goal
+from coop_drake.campaign.execution import Order, make_batch
+from coop_drake.campaign.plans import source_digest
+from coop_drake.campaign.records import CampaignFolder, table_of
 from coop_drake.planning.planner import plan
 from coop_drake.plant import planning_problem
 from coop_drake.plant.problem import collisions
@@ -27,6 +42,12 @@ from coop_drake.tree.component_tree import Body, Component, ComponentTree
 from tests.support.cases import rectangle
 
 SMALL = QuestionSettings(seeds=(3,), robots=(2,), most_joints=1, floors=("room",), peer_time=0.0)
+RIGHT = QuestionRecord(0, 3, "room", 2, 2, "bar", "plan", 1.5, verified=True, sampled_margin=1e-6)
+FILE = """
+questions: {count: 5, seeds: [3], robots: [2], most_joints: 1, floors: [room], batch: 2, peer_time: 0.0}
+"""
+LAST = 4
+"""The only question of the last batch."""
 
 
 @pytest.fixture(scope="module")
@@ -34,17 +55,15 @@ def question(tmp_path_factory):
     return random_question(SMALL, 5, tmp_path_factory.mktemp("question"))
 
 
-def files(folder):
-    return {path.name: path.read_bytes() for path in folder.iterdir()}
-
-
 def test_a_seed_and_a_number_determine_all_files(question, tmp_path):
+    def files(asked):
+        return {path.name: path.read_bytes() for path in asked.scenario.path.parent.iterdir()}
+
     again = random_question(SMALL, 5, tmp_path / "again")
-    other = random_question(SMALL, 1, tmp_path / "other")
-    before = files(question.scenario.path.parent)
-    assert files(again.scenario.path.parent) == before
+    assert files(again) == files(question)
     assert again.width_ratio == question.width_ratio or isnan(question.width_ratio)
-    assert set(files(other.scenario.path.parent).values()).isdisjoint(before.values())
+    other = files(random_question(SMALL, 1, tmp_path / "other"))
+    assert set(other.values()).isdisjoint(files(question).values())
 
 
 def test_a_question_is_an_ordinary_scenario_that_begins_and_ends_without_collision(question):
@@ -61,14 +80,13 @@ def test_some_joints_have_goals_at_which_the_team_is_free(tmp_path):
         problem = random_question(asked, number, tmp_path / str(number)).problem
         if any(goal is not None for goal in problem.goal_joints):
             break
-    free = [joint.index for joint in problem.tree.joints if problem.goal_joints[joint.index] is None]
-    random = np.random.default_rng(0)
-    lower, upper = problem.tree.joint_lower, problem.tree.joint_upper
+    random, tree = np.random.default_rng(0), problem.tree
     tried = (
-        at_goal(problem.goal_pose, problem.goal_joints, random.uniform(lower, upper)) for _ in range(300)
+        at_goal(problem.goal_pose, problem.goal_joints, random.uniform(tree.joint_lower, tree.joint_upper))
+        for _ in range(300)
     )
-    assert free
-    assert any(not list(collisions(problem.tree, z, problem.workspace)) for z in tried)
+    assert None in problem.goal_joints
+    assert any(not list(collisions(tree, z, problem.workspace)) for z in tried)
 
 
 @pytest.mark.parametrize("kind", FLOORS)
@@ -108,25 +126,18 @@ def planned(question):
     return found
 
 
-def test_sampled_cells_keep_bodies_apart_and_moved_ones_do_not(question, planned):
+def test_sampled_cells_keep_bodies_apart_and_forged_ones_do_not(question, planned):
+    """Forged are a larger cell, one thin cell that leads out of the floor, and wider intervals."""
     problem, plan = question.problem, planned.plan
     assert sampled_margin(problem, plan, 40, 1) > 0.0
-    moved = plan.cells[0].tidied.buffer(0.05, join_style="mitre")
-    forged = replace(plan, cells=(replace(plan.cells[0], tidied=moved), *plan.cells[1:]))
-    assert sampled_margin(problem, forged, 40, 1) <= 0.0
-
-
-def test_one_sample_of_a_thin_cell_is_taken(question, planned):
-    problem, plan = question.problem, planned.plan
+    first, *others = plan.cells
     thin = shapely.LineString([(0.0, 0.0), (1.0, 1.0)]).buffer(1e-9)
-    cell = replace(plan.cells[0], tidied=thin)
-    assert sampled_margin(problem, replace(plan, cells=(cell,)), 1, 1) <= 0.0  # It leads out of the floor.
-
-
-def test_a_wider_interval_than_proved_is_found_by_sampling(question, planned):
-    problem, plan = question.problem, planned.plan
-    wider = [replace(cell, upper=cell.upper + 0.5) for cell in plan.cells]
-    assert sampled_margin(problem, replace(plan, cells=tuple(wider)), 40, 1) <= 0.0
+    for cells in (
+        (replace(first, tidied=first.tidied.buffer(0.05, join_style="mitre")), *others),
+        (replace(first, tidied=thin),),
+        tuple(replace(cell, upper=cell.upper + 0.5) for cell in plan.cells),
+    ):
+        assert sampled_margin(problem, replace(plan, cells=cells), 40 if len(cells) > 1 else 1, 1) <= 0.0
 
 
 def test_other_planners_find_an_easy_path_and_none_through_a_wall(question):
@@ -137,12 +148,17 @@ def test_other_planners_find_an_easy_path_and_none_through_a_wall(question):
     island = box(x - 2.0, y - 2.0, x + 2.0, y + 2.0)
     closed = replace(question.problem, workspace=island, goal_pose=np.array([x + 9.0, y, 0.0]))
     nothing = search_by_peers(closed, 0.1, 1)
-    assert nothing.path is None
-    assert nothing.planners[0] == "trees"
+    assert (nothing.path, nothing.planners[0]) == (None, "trees")
 
 
-def test_an_answer_is_checked_and_sampled(question, planned, monkeypatch):
-    answered(monkeypatch, planned)
+@pytest.fixture
+def answered(monkeypatch):
+    """Let the planner give an answer."""
+    return lambda result: monkeypatch.setattr(answering, "plan", lambda *given, **named: result)
+
+
+def test_an_answer_is_checked_and_sampled(question, planned, answered):
+    answered(planned)
     record, found = answer(question, SMALL)
     assert (record.verdict, record.cells, record.verified) == ("plan", len(planned.plan.cells), True)
     assert record.first_plan_seconds == planned.report.first_plan_cpu_seconds
@@ -151,24 +167,18 @@ def test_an_answer_is_checked_and_sampled(question, planned, monkeypatch):
     assert not record.is_wrong
 
 
-def test_a_plan_for_another_question_is_wrong(question, planned, monkeypatch):
-    right = planned.plan
-    answered(monkeypatch, Found(replace(right, start=right.start + 0.1), SearchReport(1, 0.5)))
+def test_a_plan_for_another_question_is_wrong(question, planned, answered):
+    answered(Found(replace(planned.plan, start=planned.plan.start + 0.1), SearchReport(1, 0.5)))
     record, _ = answer(question, SMALL)
-    assert not record.verified
-    assert record.reason
-    assert record.is_wrong
+    assert (record.verified, bool(record.reason), record.is_wrong) == (False, True, True)
 
 
-def test_a_no_is_searched_against(question, monkeypatch):
-    answered(monkeypatch, Infeasible("no way", SearchReport(1)))
+def test_a_no_is_searched_against(question, answered):
+    answered(Infeasible("no way", SearchReport(1)))
     record, found = answer(question, replace(SMALL, peer_time=5.0))
     assert (record.verdict, record.verified, record.peer, record.peer_found) == (
-        "infeasible",
-        False,
-        "trees",
-        True,
-    )
+        "infeasible", False, "trees", True
+    )  # fmt: skip
     assert fault_of(question.problem, found.path) == ""
     assert record.is_wrong
 
@@ -210,33 +220,139 @@ def test_a_plan_whose_way_was_certified_within_the_limit_counts(question, monkey
     assert not record.is_wrong
 
 
-def test_an_undecided_question_for_which_a_peer_finds_a_way_is_kept(monkeypatch, tmp_path):
-    answered(monkeypatch, Undecided("too narrow", SearchReport(7)))
+def test_an_undecided_question_for_which_a_peer_finds_a_way_is_kept(monkeypatch, answered, tmp_path):
+    answered(Undecided("too narrow", SearchReport(7)))
     path = np.zeros((2, 5))
     monkeypatch.setattr(answering, "search_by_peers", lambda *given: Searched(("trees",), path, 0.2))
     record = ask(5, SMALL, tmp_path)
     assert (record.peer, record.peer_found, record.peer_seconds) == ("trees", True, 0.2)
-    assert record.reason == "too narrow"
     kept = json.loads((tmp_path / "3_5" / "found.json").read_text())
     assert kept["path"] == path.tolist()
-    assert kept["record"]["reason"] == "too narrow"
+    assert kept["record"]["reason"] == record.reason == "too narrow"
+
+
+def summary(*records):
+    """How questions were answered, by groups."""
+    return summarise_questions(table_of(records, QuestionRecord))
 
 
 @pytest.mark.parametrize(
     ("changes", "wrong"),
     [
-        ({}, False),
-        ({"verified": False}, True),
-        ({"sampled_margin": 0.0}, True),
-        ({"verdict": "infeasible", "peer_found": True}, True),
-        ({"verdict": "infeasible", "sampled_margin": nan}, False),
-        ({"verdict": "undecided", "verified": False, "peer_found": True}, False),
+        ({}, 0),
+        ({"verified": False}, 1),
+        ({"sampled_margin": 0.0}, 1),
+        ({"sampled_margin": 0.0, "verified": False}, 1),
+        ({"verdict": "failed", "verified": False}, 1),
+        ({"verdict": "infeasible", "peer_found": True}, 1),
+        ({"verdict": "infeasible", "sampled_margin": nan}, 0),
+        ({"verdict": "undecided", "verified": False, "peer_found": True}, 0),
     ],
 )
-def test_what_makes_an_answer_wrong(changes, wrong):
-    record = QuestionRecord(0, 1, "room", 2, 2, "bar", "plan", verified=True, sampled_margin=1e-6)
-    assert replace(record, **changes).is_wrong is wrong
+def test_what_makes_an_answer_wrong_and_it_counts_once(changes, wrong):
+    record = replace(RIGHT, **changes)
+    assert record.is_wrong == bool(wrong)
+    every = summary(RIGHT, record)[-1]
+    assert (every.count, every.wrong) == (2, wrong)
 
 
-def answered(monkeypatch, result):
-    monkeypatch.setattr(answering, "plan", lambda *given, **named: result)
+def test_questions_are_grouped_by_what_makes_them_hard():
+    rows = [("corridor", "plan", True, False), ("corridor", "infeasible", True, True),
+            ("corridor", "plan", False, False), ("rooms", "undecided", False, True)]  # fmt: skip
+    questions = summary(
+        *(
+            QuestionRecord(i, i, floor, 2 + i % 2, 2, "bar", verdict, 1.0 + i, verified=verified,
+                           peer_found=found, corners=12 + i, width_ratio=[0.9, 1.1, 1.1, np.nan][i])
+            for i, (floor, verdict, verified, found) in enumerate(rows)
+        )
+    )  # fmt: skip
+    assert {(one.axis, one.group): one.count for one in questions} == {
+        ("floor", "corridor"): 3, ("floor", "rooms"): 1, ("robots", "2"): 2, ("robots", "3"): 2,
+        ("joints", "1 to 2"): 4, ("corners", "0 to 12"): 1, ("corners", "13 to 24"): 3,
+        ("width", "0.8 to 1"): 1, ("width", "1 to 1.2"): 2, ("all", "all"): 4,
+    }  # fmt: skip
+    corridor, rooms, *_, every = questions
+    assert (corridor.group, corridor.plans, corridor.infeasible, corridor.wrong) == ("corridor", 2, 1, 2)
+    assert (rooms.undecided, rooms.peer_found, rooms.wrong) == (1, 1, 0)
+    assert (every.count, every.seconds.largest) == (4, 4.0)
+    results = Results(questions, missing=3)
+    said = "4 questions: 2 wrong answers, 1 undecided. The study is not complete: 3 batches are missing."
+    assert (results.headline, results.good) == (said, False)
+
+
+def test_a_question_whose_process_was_lost_counts_and_has_no_time():
+    lost = QuestionRecord(1, 1, "", 0, 0, "", "failed", reason="no result within 60 s")
+    groups = summary(RIGHT, lost)
+    every = groups[-1]
+    assert (every.count, every.wrong, every.seconds.count, every.seconds.largest) == (2, 1, 1, 1.5)
+    assert {one.axis for one in groups if one.count == 1} == {"floor", "robots", "joints", "corners"}
+    (every,) = summary(lost)
+    assert every.cells()[-3:] == ("", "", "")
+
+
+@pytest.fixture(scope="module")
+def asked(tmp_path_factory) -> Study:
+    path = tmp_path_factory.mktemp("study") / "asked.study.yaml"
+    path.write_text(FILE)
+    return load_study(path)
+
+
+def written(folder, batch, **changes):
+    """Write right answers of a batch."""
+    record = replace(RIGHT, **changes)
+    folder.write(batch, [replace(record, question=number) for number in range(batch.first, batch.stop)])
+
+
+def test_more_questions_and_other_floors_change_only_the_batches_that_they_concern():
+    asked = QuestionSettings(count=5, batch=2)
+    few, many = list(question_batches(asked)), list(question_batches(replace(asked, count=8)))
+    assert [(one.first, one.stop) for one in few] == [(0, 2), (2, 4), (4, 5)]
+    assert [one.digest for one in few[:2]] == [one.digest for one in many[:2]]
+    assert few[2].digest != many[2].digest
+    others = {one.digest for one in question_batches(replace(asked, floors=("door",)))}
+    assert others.isdisjoint(one.digest for one in few)
+
+
+@pytest.mark.slow
+def test_a_process_answers_as_this_one_does(asked, tmp_path):
+    folder = CampaignFolder(tmp_path)
+    folder.campaign.write_text(FILE)
+    batches = batches_of(asked, folder)
+    last = batches[LAST // 2]
+    assert make_batch(Order(str(asked.path), str(tmp_path), last, 600.0))
+    assert folder.missing(batches) == list(batches[:-1])
+    assert folder.costs(batches)[0]["sources"] == source_digest()
+    assert folder.by_other_sources(batches) == 0
+    (row,) = folder.records(batches, QuestionRecord).to_pylist()
+    here = asdict(ask(LAST, asked.questions))
+    differing = {name for name in row if str(row[name]) != str(here[name])}
+    assert all(name.endswith(MEASURED) for name in differing)
+    assert (row["verdict"], row["verified"]) == ("plan", True)
+    assert not (folder.path / CASES).exists()
+
+
+def test_a_wrong_answer_is_counted_and_fails_the_command(asked, tmp_path):
+    folder, command = CampaignFolder(tmp_path), ["study", str(asked.path), "--out", str(tmp_path), "--json"]
+    for batch in batches_of(asked, folder):
+        written(folder, batch)
+    assert CliRunner().invoke(app, command).exit_code == 0
+    written(folder, batch, verified=False)
+    failed = CliRunner().invoke(app, command)
+    assert failed.exit_code == 1
+    every = json.loads(failed.stdout)["questions"][-1]
+    assert (every["count"], every["plans"], every["wrong"]) == (5, 5, 1)
+
+
+def test_batches_that_other_sources_made_are_counted(asked, tmp_path):
+    folder = CampaignFolder(tmp_path)
+    for batch, sources in zip(batches_of(asked, folder), (source_digest(), "0" * 64), strict=False):
+        written(folder, batch)
+        folder.note(batch, {"runs": 1, "cpu_seconds": 1.0, "sources": sources})
+    status = CliRunner().invoke(app, ["study", "--status", str(asked.path), "--out", str(tmp_path), "--json"])
+    assert json.loads(status.stdout)["batches_by_other_sources"] == 1
+
+
+def test_a_question_is_written_as_a_scenario(asked, tmp_path):
+    done = CliRunner().invoke(app, ["question", str(asked.path), str(LAST), "--out", str(tmp_path)])
+    assert done.exit_code == 0
+    assert (tmp_path / "drawn" / "4" / "question_3_4.scenario.yaml").exists()

@@ -1,0 +1,223 @@
+"""Questions of growing size, our planner and its peers on them: what is asked, counted and credited."""
+
+import pickle
+from math import isfinite
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from benchmarks.isolated import Isolated
+from benchmarks.planner import contradiction, critical_width, growth
+from benchmarks.planner.ablation import VARIANTS, answer
+from benchmarks.planner.cases import CASES
+from benchmarks.planner.contradiction import Patience, contradiction_rows
+from benchmarks.planner.critical_width import CORRIDORS, Corridor, critical_interval, critical_width_rows
+from benchmarks.planner.family import (
+    corridor_problem,
+    crowd_problem,
+    first_question,
+    shelf_floor,
+    shelf_problem,
+)
+from benchmarks.planner.gcs_peer import run_gcs
+from benchmarks.planner.head_to_head import judged
+from benchmarks.planner.ours import Planned, plan_repeatedly
+from benchmarks.planner.stages import STAGES, without_stage
+from benchmarks.questions.peers import PeerRun, fault_of, free_goals, prepared_check, run_ompl, run_trees
+from coop_drake.planning.sampling.collision import grid_for_team, is_free
+from coop_drake.tree.team_arrays import team_arrays
+
+EASY = first_question()
+STILL = np.zeros((0, 5))
+
+
+def straight(problem, *goal_joints):
+    return np.array([problem.start, [*problem.goal_pose, *goal_joints]])
+
+
+HONEST = straight(EASY, 0.3, -0.2)
+
+
+def starts_freely(problem):
+    team = team_arrays(problem.tree)
+    return is_free(team, grid_for_team(problem.workspace, team), problem.start.astype(float), 0.0)
+
+
+MAKERS = {
+    "corridor": (lambda: corridor_problem(0.9), 2),
+    "four": (lambda: corridor_problem(1.3, 1.5, robots=4), 4),
+    "three joints": (lambda: corridor_problem(joints_per_arm=3), 6),
+    "crowd": (lambda: crowd_problem(6), 6),
+    "shelves": (lambda: shelf_problem(500), 2),
+}
+
+
+@pytest.mark.parametrize(("make", "joints"), MAKERS.values(), ids=MAKERS)
+def test_questions_can_be_started_have_as_many_joints_as_asked_and_are_the_same_every_time(make, joints):
+    problem, again = make(), make()
+    assert starts_freely(problem)
+    assert [joint.index for joint in problem.tree.joints] == list(range(joints))
+    assert problem.workspace.wkb == again.workspace.wkb
+    assert pickle.dumps(team_arrays(problem.tree)) == pickle.dumps(team_arrays(again.tree))
+
+
+@pytest.mark.parametrize("vertices", [50, 500, 5_000])
+def test_warehouses_have_about_as_many_vertices_as_asked(vertices):
+    floor = shelf_floor(vertices)
+    made = sum(len(ring.coords) - 1 for ring in (floor.exterior, *floor.interiors))
+    assert floor.is_valid
+    assert abs(made - vertices) <= 4
+
+
+@pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
+def test_every_scenario_file_can_be_read_and_the_family_holds_the_shipped_one(case):
+    problem = case.problem()
+    assert starts_freely(problem)
+    if case.name == "base":
+        mine = corridor_problem()
+        assert mine.workspace.equals(problem.workspace)
+        assert np.array_equal(mine.start, problem.start)
+        assert [one.range for one in mine.tree.joints] == [one.range for one in problem.tree.joints]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("variant", VARIANTS)
+def test_every_variant_answers_an_easy_question(variant):
+    answered = answer(EASY, variant)
+    assert answered.answer == "found"
+    assert answered.slices > 0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("variant", STAGES)
+def test_a_plan_is_found_without_any_one_stage(variant):
+    replaced = [(part.module, part.name, getattr(part.module, part.name)) for part in STAGES[variant]]
+    planned = without_stage(EASY, variant)
+    assert planned.answer == "found"
+    assert planned.transport_seconds > 0.0
+    assert all(getattr(module, name) is value for module, name, value in replaced)
+
+
+def _think_forever(problem):
+    while True:
+        pass
+
+
+@pytest.mark.slow
+def test_out_of_time_is_no_answer(monkeypatch):
+    monkeypatch.setattr(growth, "plan_once_warm", _think_forever)
+    rows = growth.growth_rows("planner/growth/none/1", EASY, limit=1)
+    assert [row.figure for row in rows] == ["answer", "peak_memory"]
+    assert (rows[0].value, rows[0].unit) == (0.0, "none within 1 CPU s")
+
+
+@pytest.mark.slow
+def test_the_same_question_has_the_same_answer_and_is_not_asked_again_without_patience():
+    first, second = plan_repeatedly(EASY, 2, patience=100.0)
+    assert (first.answer, first.slices, first.cells) == (second.answer, second.slices, second.cells)
+    assert len(plan_repeatedly(EASY, 5, patience=0.0)) == 1
+
+
+@pytest.mark.parametrize("run", [run_trees, run_ompl])
+def test_a_peer_finds_a_path_that_holds_and_the_same_again_and_gives_up_when_its_budget_is_spent(run):
+    question, budget, small = corridor_problem(), *((20_000, 2_000) if run is run_trees else (5.0, 0.2))
+    first = [item for item in run(question, (1, 2, 3), budget) if item.found]
+    assert not fault_of(question, first[0].path)
+    again = {item.seed: item for item in run(question, (3, 2, 1), budget)}
+    for item in first:
+        assert np.array_equal(item.path, again[item.seed].path)
+        assert item.checks == again[item.seed].checks > 0
+    (only,) = run(corridor_problem(0.77), (1,), small)
+    assert (only.found, only.checks > 0) == (False, True)
+
+
+@pytest.mark.slow
+def test_regions_of_drake_s_planner_hold_a_path_between_walls_and_without_time_there_is_none():
+    run = run_gcs(EASY, 60.0)
+    assert run.regions > 0
+    assert fault_of(EASY, run.path) == ""
+    nothing = run_gcs(EASY, -1.0)
+    assert (nothing.regions, len(nothing.path)) == (0, 0)
+
+
+def test_goals_keep_joints_that_are_asked_for():
+    free = free_goals(EASY, prepared_check(EASY), 5, seed=1)
+    assert free.shape == (5, 5)
+    assert (free[:, :3] == EASY.goal_pose).all()
+    assert len(np.unique(free[:, 3])) == 5
+
+
+def test_honest_paths_pass_and_wrong_ones_are_told_apart():
+    question = corridor_problem()
+    assert fault_of(EASY, HONEST) == ""
+    for asked, path, fault in (
+        (question, straight(question, 0.0, 0.0), "collides"),
+        (EASY, straight(EASY, 0.0, 0.0)[::-1], "begin"),
+        (EASY, np.array([EASY.start, EASY.start]), "end"),
+        (EASY, straight(EASY, 2.0, 0.0), "range"),
+    ):
+        assert fault in fault_of(asked, path)
+
+
+def test_a_peer_is_judged_by_its_median_with_failures_and_wrong_paths_counted():
+    paths = [HONEST] * 3 + [STILL, straight(EASY, 2.0, 0.0)]
+    runs = [PeerRun(k, 0.1 * k, path, 10) for k, path in enumerate(paths, 1)]
+    rows = {row.figure: (row.value, row.unit) for row in judged("planner/peer/easy", EASY, runs, "no time")}
+    assert rows["found"] == (3, "of 5 within no time")
+    assert rows["wrong"] == (1, "paths")
+    assert [rows[name][0] for name in ("cpu_seconds", "fastest", "slowest")] == pytest.approx([0.3, 0.1, 0.3])
+
+
+def asked(answer):
+    """An interval of a planner that answers by the width itself, two seconds each."""
+    return critical_interval(
+        Corridor(lambda width: width, 0.7, 0.8, 1e-3), lambda width: (answer(width), 2.0)
+    )
+
+
+def test_bounds_meet_at_the_critical_width_and_undecided_ones_keep_them_apart():
+    found = asked(lambda w: "infeasible" if w < 0.7314 else "beyond limits" if w < 0.75 else "found")
+    assert found.no_way < 0.7314 <= found.way
+    assert found.way - found.no_way <= 1e-3
+    assert (found.undecided, set(found.seconds)) == ((), {2.0})
+    found = asked(lambda w: "infeasible" if w < 0.72 else "found" if w > 0.74 else "undecided")
+    assert 0.719 <= found.no_way < 0.72
+    assert 0.74 < found.way <= 0.741
+    assert all(0.72 <= width <= 0.74 for width in found.undecided)
+    assert len(found.seconds) < 20
+
+
+def test_a_bound_that_takes_too_long_is_unknown(monkeypatch):
+    ended = SimpleNamespace(value=None)
+    monkeypatch.setattr(critical_width, "in_own_process", lambda *given, limit: ended)
+    rows = critical_width_rows("two", Corridor(lambda width: width, 0.7, 0.8, 1e-3), 60.0)
+    assert all(isfinite(row.value) for row in rows)
+    assert (rows[0].name, rows[0].value, rows[0].unit) == ("two/answer", 0.0, "unknown to unknown")
+    assert rows[1].unit == "of 2 widths"
+
+
+@pytest.mark.parametrize("name", CORRIDORS)
+def test_corridors_are_questions_of_their_width(name):
+    corridor = CORRIDORS[name]
+    assert corridor.ask(corridor.narrow).workspace.area < corridor.ask(corridor.wide).workspace.area
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("answer", "contradictions"), [("infeasible", 1), ("undecided", 0)])
+def test_only_paths_that_hold_contradict_and_only_a_no(monkeypatch, answer, contradictions):
+    ours = Planned(answer, 1.0, 1.0, 1, 1, 0.0, 0.0)
+    wrong = np.array([EASY.start, [9.0, 9.0, 0.0, 0.0, 0.0]])
+    peers = (PeerRun(1, 2.0, HONEST, 10), PeerRun(2, 3.0, wrong, 20))
+
+    def faked(work, *arguments, limit):
+        return Isolated((ours,) if work is plan_repeatedly else peers, 1.0, None)
+
+    monkeypatch.setattr(contradiction, "in_own_process", faked)
+    monkeypatch.setattr(contradiction, "has_ompl", lambda: False)
+    found = contradiction_rows("planner/no_way/easy", EASY, Patience())
+    rows = {row.figure: (row.value, row.unit) for row in found}
+    assert rows["answer"] == (float(answer == "infeasible"), answer)
+    assert rows["contradictions"] == (contradictions, "paths in 2 runs, 5 CPU s")
+    assert rows["paths_found"] == (1, "paths")
+    assert rows["checks"] == (30, "checks")
