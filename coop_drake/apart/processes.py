@@ -258,7 +258,7 @@ def run_world(
     ends, outcome = Ends(network, WORLD), INTERRUPTED
     options["tolerated"] = tolerated_age(scenario.deployment, plan.budget)
     options["oldest"] = certified_age(plan.budget) + TOLERATED
-    exchange = SampleExchange(ends, network, **options)
+    exchange = SampleExchange(ends, network, len(plan.cells), **options)
     world = build_world(scenario, plan, exchange)
     exchange.brakes = brakes_of(scenario, world.team)
     gc.freeze()  # To collect garbage among all that was imported takes a tenth of a second.

@@ -110,6 +110,7 @@ class SampleExchange:
     Args:
         ends: The world's sockets, with sessions.
         network: Robots, period of the samples, and faults of the robots' clocks.
+        cells: Number of cells of the plan; a supervisor that names any other is refused.
         pacing: Keeps the pace of the wall clock; None for lock-step, in which every sample waits.
         tolerated: How long drives hold the last effort of a robot that gives no other [s].
         oldest: Largest age that measurements on which an effort rests may have at its sample [s]; drives do
@@ -132,6 +133,7 @@ class SampleExchange:
         self,
         ends: Ends,
         network: Network,
+        cells: int,
         *,
         pacing: Pacing | None = None,
         tolerated: float = TOLERATED,
@@ -144,6 +146,7 @@ class SampleExchange:
         tell: Callable[[str], None] = lambda words: None,
     ) -> None:
         self._ends, self._patience, self._before, self._pacing = ends, patience, before, pacing
+        self._cells = cells
         self._everyone, self._period = [*range(len(network.book.robots)), SUPERVISOR], network.period
         self.report, self._every = report, max(1, round(_REPORTED / network.period))
         self._clock, self._oldest = network.faults.clock, oldest + _ROUNDING
@@ -314,10 +317,11 @@ class SampleExchange:
         return Sample(*head, heard, placed, moved, pose, state)
 
     def _fits(self, sender: int, message: Effort | Telemetry | Status) -> bool:
-        """Whether the lists of an answer are as long as they must be, and its state is one."""
+        """Whether the lists of an answer are as long as they must be, and its state and its cell exist."""
         if isinstance(message, Status):
             robots = len(self._sizes)
-            return len(message.team_messages) == robots and len(message.causes) in (0, 1 + robots)
+            fitting = len(message.team_messages) == robots and len(message.causes) in (0, 1 + robots)
+            return fitting and message.cell < self._cells
         if isinstance(message, Effort):
             size = self._sizes[sender]
             fitting = len(message.efforts) == size and len(message.rest) in (0, size)

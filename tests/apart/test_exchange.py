@@ -1,4 +1,4 @@
-"""The exchange of samples, with processes whose answers the test chooses."""
+"""The exchange of samples with processes whose answers tests choose; who is missing; faults of messages."""
 
 from collections import deque
 
@@ -6,11 +6,30 @@ import msgspec
 import numpy as np
 import pytest
 
-from coop_drake.apart.messages import SUPERVISOR, Effort, Reason, Refusals, Sample, Status, Telemetry, Welcome
+from coop_drake.answers.budget import Budget
+from coop_drake.apart.faults import ChannelFaults, ClockFault, Faults, Gap, load_faults
+from coop_drake.apart.membership import Membership, Processes
+from coop_drake.apart.messages import (
+    SUPERVISOR,
+    WORLD,
+    Effort,
+    Ready,
+    Reason,
+    Refusals,
+    Sample,
+    Status,
+    Telemetry,
+    Welcome,
+)
+from coop_drake.apart.node import FOLLOWS, OUTSIDE, STANDS
+from coop_drake.apart.processes import tolerated_age
 from coop_drake.apart.team_files import local_book
-from coop_drake.apart.transport import Network
+from coop_drake.apart.transport import Network, Session
 from coop_drake.apart.world import Pacing, SampleExchange
+from coop_drake.errors import ScenarioError
 from coop_drake.laws.actuators import Brake
+from coop_drake.scenario import Deployment
+from coop_drake.scenario.deployment import Measurements
 
 PERIOD = 0.005
 MEASURED = [np.zeros(2 * 3 + 3)]
@@ -49,7 +68,7 @@ class Team:
 
 
 def made(team, **options):
-    exchange = SampleExchange(team, Network(local_book(1), period=PERIOD), **options)
+    exchange = SampleExchange(team, Network(local_book(1), period=PERIOD), 3, **options)
     exchange.brakes = [Brake(np.ones(3), np.full(2, np.inf))]
     return exchange
 
@@ -70,9 +89,13 @@ def test_everybody_is_asked_without_consequence_before_the_first_sample(team, ex
     assert exchange.step(0.0, MEASURED)[0][0] == 0.0
 
 
-def test_a_robot_that_is_late_for_the_log_between_two_samples_is_not_missing(team, exchange):
+def begun(exchange):
     exchange.look(0.0, MEASURED)
     exchange.step(0.0, MEASURED)
+
+
+def test_a_robot_that_is_late_for_the_log_between_two_samples_is_not_missing(team, exchange):
+    begun(exchange)
     team.late = True
     shown = exchange.look(0.002, MEASURED)
     assert shown[0] == 0.0
@@ -87,8 +110,7 @@ def test_a_robot_that_is_late_for_the_log_between_two_samples_is_not_missing(tea
 
 
 def test_a_robot_that_is_late_for_a_sample_is_missing_and_the_drives_brake(team, exchange):
-    exchange.look(0.0, MEASURED)
-    exchange.step(0.0, MEASURED)
+    begun(exchange)
     team.late = True
     exchange.look(PERIOD, MEASURED)
     assert exchange.missing == {0: 0.0}
@@ -124,12 +146,189 @@ GOOD, STATUS = Effort(0, 0.0, 1, 0, (1.0, 2.0, 3.0), ()), Status(0, 0.0, True, (
         (0, msgspec.structs.replace(GOOD, state=9)),
         (SUPERVISOR, msgspec.structs.replace(STATUS, team_messages=())),
         (SUPERVISOR, msgspec.structs.replace(STATUS, causes=(1, 2, 3, 4))),
+        (SUPERVISOR, msgspec.structs.replace(STATUS, cell=3)),
     ],
 )
 def test_an_answer_that_is_well_formed_and_does_not_fit_changes_nothing(team, sender, wrong):
     team.answers.append((sender, wrong))
     exchange = made(team)
     assert exchange.step(0.0, MEASURED)[0].tolist() == [0.0, 0.0, 0.0]
+    assert exchange.look(0.002, MEASURED)[1:].tolist() == [0.0, 0.0, 0.0]
     assert exchange.facts()["processes"][0]["state"] == "follows the plan"
     assert team.refusals.counts == {Reason.VALUE: 1}
     assert not exchange.missing
+
+
+class Book(Processes):
+    """A membership, with who has ended, what was revived and what was told."""
+
+    def __init__(self, *, restarts=0, rejoin=60.0, **options):
+        self.ended, self.told, self.restarts = set(), [], restarts
+        self.membership = Membership(rejoin=rejoin, **options, processes=self, tell=self.told.append)
+
+    def gone(self):
+        return self.ended
+
+    def revive(self, index):
+        if not self.restarts:
+            return False
+        self.restarts -= 1
+        self.ended.discard(index)
+        return True
+
+
+def test_the_drives_brake_once_a_robot_is_missing_for_longer_than_is_tolerated():
+    book = Book()
+    book.membership.lose({1: 0.39})
+    book.membership.see(0.40, {0: FOLLOWS}, rests=False)
+    assert not book.membership.stopped
+    book.membership.see(0.42, {0: FOLLOWS}, rests=False)
+    assert book.membership.stopped
+    assert book.told == ["robot 1 has not answered since t = 0.39 s"]
+    book.membership.back(1)
+    book.membership.see(0.9, {0: STANDS, 1: STANDS}, rests=True)
+    book.membership.close_line(1.1, certified=True)
+    assert book.membership.facts()["stops"] == [
+        {"cause": "robot 1", "since": 0.42, "rested": 0.9, "resumed": 1.1, "certified": True}
+    ]
+    assert book.told[1:] == ["robot 1 is there again", "the team goes on at t = 1.1 s"]
+
+
+def test_where_nothing_is_tolerated_the_drives_brake_at_the_first_sample_without_an_answer():
+    membership = Book(tolerated=0.0).membership
+    assert not membership.too_long(0.3, 0.1 + 0.2)
+    membership.lose({1: 0.395})
+    membership.see(0.4, {0: FOLLOWS}, rests=False)
+    assert membership.stopped
+
+
+@pytest.mark.parametrize(("planned", "tolerated"), [(None, 0.02), (0.01, 0.0), (0.025, 0.015), (0.005, 0.0)])
+def test_a_budget_tolerates_what_its_delay_leaves_beside_that_of_measurements(planned, tolerated):
+    deployment = Deployment(control_rate=200.0, measurements=Measurements(delay=0.01))
+    found = tolerated_age(deployment, None if planned is None else Budget(delay=planned))
+    assert found == pytest.approx(tolerated)
+
+
+def test_without_the_supervisor_the_drives_do_not_brake():
+    membership = Book().membership
+    membership.lose({SUPERVISOR: 0.3})
+    membership.see(5.0, {0: FOLLOWS, 1: FOLLOWS}, rests=True)
+    assert (membership.stopped, membership.trouble) == (False, "")
+
+
+@pytest.mark.parametrize(("rejoin", "ended"), [(0.0, set()), (60.0, {1})])
+def test_a_team_at_rest_waits_neither_for_ever_nor_for_who_does_not_come_back(rejoin, ended):
+    book = Book(rejoin=rejoin)
+    book.ended = ended
+    book.membership.lose({1: 0.39})
+    book.membership.see(0.5, {}, rests=False)
+    assert not book.membership.trouble
+    book.membership.see(1.0, {}, rests=True)
+    assert book.told[-1] == f"the team rests and waits for robot 1 for at most {rejoin:g} s"
+    assert (
+        book.membership.trouble == "robot 1 has not answered since t = 0.39 s; the team rests since t = 1 s"
+    )
+
+
+def test_who_has_ended_is_started_again_as_often_as_allowed():
+    book = Book(restarts=2)
+    book.ended = {1}
+    book.membership.lose({1: 0.39})
+    assert book.told == ["robot 1 has not answered since t = 0.39 s; it is started again"]
+    for time, trouble in ((1.0, False), (1.1, True)):
+        book.ended = {1}
+        book.membership.see(time, {}, rests=True)
+        assert bool(book.membership.trouble) == trouble
+    assert book.membership.facts()["restarts"] == {"robot 1": 2}
+
+
+def test_a_team_that_rests_outside_its_cell_ends_the_run():
+    book = Book()
+    book.membership.see(0.4, {0: STANDS, 1: STANDS}, rests=False)
+    for time, trouble in ((0.8, ""), (1.2, ""), (1.4, "robot 1 cannot begin")):
+        book.membership.see(time, {0: STANDS, 1: OUTSIDE}, rests=True)
+        assert book.membership.trouble.startswith(trouble)
+        assert bool(book.membership.trouble) == bool(trouble)
+    assert book.membership.trouble.endswith("the team rests since t = 0.8 s")
+
+
+STEP = 0.01
+
+
+def sending(faults, messages, sender=0, receiver=SUPERVISOR):
+    """Numbers of the messages that leave at each sample, one message being sent at each."""
+    left, now = [], []
+
+    def put(data):
+        now.append(msgspec.msgpack.decode(data)[1])
+        return True
+
+    session = Session(put, Network(local_book(2), faults=faults, period=STEP).link(sender, receiver))
+    session.begin(1, is_open=True)
+    for sample, message in enumerate(messages):
+        session.send(message, sample)
+        session.release(sample)
+        left.append(tuple(now))
+        now.clear()
+    return left, session.sent
+
+
+def reports(count):
+    return [Ready(cell, True) for cell in range(count)]
+
+
+def test_every_message_has_its_own_fate_by_the_seed():
+    faults = [Faults(seed=seed, team=ChannelFaults(loss=0.3, repeat=0.3)) for seed in (1, 1, 2)]
+    first, again, other = (sending(fault, reports(200)) for fault in faults)
+    assert first == again
+    assert first != other
+    counts = [len(numbers) for numbers in first[0]]
+    assert 40 < counts.count(0) < 80
+    assert 25 < counts.count(2) < 65
+    assert first[1] == 200 - counts.count(0)
+    assert sending(faults[0], reports(200), sender=1) != first
+
+
+def test_late_messages_leave_after_what_is_sent_then_and_count_where_nothing_has_overtaken_them():
+    faults = Faults(team=ChannelFaults(late=1.0, late_by=0.015))
+    assert sending(faults, reports(6)) == ([(1,), (), (), (2,), (3,), (4,)], 4)
+    mixed, sent = sending(Faults(seed=3, team=ChannelFaults(late=0.5, late_by=0.03)), reports(40))
+    order = [number for numbers in mixed for number in numbers]
+    assert order != sorted(order)
+    assert sent == sum(number > max(order[:k], default=0) for k, number in enumerate(order))
+
+
+def test_nothing_passes_a_gap_but_what_the_log_needs():
+    gap = Gap(0.02, 0.03, robots=(0,))
+    samples = [Sample(k, k * STEP, True, False, 0, 0.0, 0.0, (), ()) for k in range(8)]
+    faults = Faults(sensors=ChannelFaults(gaps=(gap,)), efforts=ChannelFaults(gaps=(gap,)))
+    assert sending(faults, samples, WORLD, 0)[0] == [(1,), (2,), (), (), (), (6,), (7,), (8,)]
+    assert sending(faults, samples, WORLD, 1)[1] == 8
+    looks = [msgspec.structs.replace(sample, step=False) for sample in samples]
+    assert sending(faults, looks, WORLD, 0)[1] == 8
+    assert sending(faults, [Effort(k, 0.0, 0, 0, (), ()) for k in range(8)], 0, WORLD)[1] == 5
+    assert sending(faults, [Telemetry(k, 0.0, 0, 0, 0, ()) for k in range(8)], 0, WORLD)[1] == 8
+    assert sending(faults, [Welcome()] * 8, WORLD, 0)[0] == [(0,)] * 8
+
+
+def test_a_clock_shows_its_own_time():
+    faults = Faults(clocks=(ClockFault(1, offset=0.5, drift=0.01),))
+    assert (faults.clock(0, 3.0), faults.clock(1, 3.0)) == (3.0, pytest.approx(3.53))
+
+
+@pytest.mark.parametrize(
+    ("text", "key"),
+    [
+        ("team: {loss: 1.5}", "team.loss"),
+        ("sensors: {gaps: [{begin: 1, duration: 1, robots: [2]}]}", r"sensors.gaps\[0\].robots"),
+        ("clocks: [{robot: 7, offset: 0.1}]", r"clocks\[0\].robot"),
+    ],
+)
+def test_a_file_is_read_and_a_wrong_one_refused_with_its_key(tmp_path, text, key):
+    path = tmp_path / "faults.yaml"
+    path.write_text("seed: 3\nteam: {loss: 0.2, gaps: [{begin: 1, duration: 0.5}]}\n")
+    expected = Faults(seed=3, team=ChannelFaults(loss=0.2, gaps=(Gap(1.0, 0.5),)))
+    assert load_faults(path, 2) == expected
+    path.write_text(text)
+    with pytest.raises(ScenarioError, match=f"faults.yaml.*{key}"):
+        load_faults(path, 2)

@@ -98,32 +98,17 @@ def test_bytes_that_are_cut_changed_or_random_raise_nothing_but_a_refusal(sent, 
     ("change", "words"),
     [
         ({"time": math.nan}, "Expected `float` >= "),
-        ({"time": -math.inf}, "Expected `float` >= "),
         ({"robot_state": [1.0, math.inf]}, r"at `$[2].robot_state[1]`"),
-        ({"time": "0.5"}, "Expected `float`, got `str`"),
         ({"time": True}, "Expected `float`, got `bool`"),
-        ({"number": 1.0}, "Expected `int`, got `float`"),
-        ({"number": -1}, "Expected `int` >= 0"),
         ({"number": 2**32}, "Expected `int` <= 4294967295"),
-        ({"step": 1}, "Expected `bool`, got `int`"),
-        ({"object_pose": None}, "Expected `array`, got `None`"),
         ({"robot_state": [0.0] * (MOST_ITEMS + 1)}, "length <= 4096"),
         ({"more": 1}, "unknown field `more`"),
-        ({"type": "Nothing"}, "Invalid value 'Nothing'"),
         ({"type": "Tick"}, "Invalid value 'Tick'"),  # That of a supervisor.
-        ({"type": 16}, "Expected `str`, got `int`"),
     ],
 )
 def test_a_field_of_another_type_or_beyond_its_limits_is_refused_and_named(change, words):
     assert decode(raw([1, 1, SAMPLE]), decoder_of(WORLD, 0))[2].object_pose == (1.0, 2.0, 0.5)
     assert words in refused(raw([1, 1, SAMPLE | change]))
-
-
-@pytest.mark.parametrize("field", SAMPLE)
-def test_a_missing_field_is_refused_and_named(field):
-    assert f"missing required field `{field}`" in refused(
-        raw([1, 1, {key: value for key, value in SAMPLE.items() if key != field}])
-    )
 
 
 HEAD, NESTED = b"\x93\x01\x01", b"\x91" * 50_000 + b"\x00"
@@ -134,14 +119,10 @@ TYPE = raw("type") + raw("Sample")
     "data",
     [
         b"",
-        raw([1, 1]),
         raw([1, 1, SAMPLE, 1]),
         raw([1, 1, SAMPLE]) + b"\0",
-        raw({"type": "Sample"}),
-        NESTED,
         b"\x93" + NESTED,
         HEAD + b"\x82" + TYPE + raw("more") + NESTED,
-        HEAD + b"\x82" + raw("more") + NESTED + TYPE,
         HEAD + b"\x82" + raw("more") + b"\x81\0" * 50_000 + b"\0" + TYPE,
         HEAD + b"\x82" + TYPE + raw("robot_state") + b"\xdd\xff\xff\xff\xff",  # A list of 2^32 - 1 items.
         HEAD + b"\xdf\xff\xff\xff\xff" + TYPE,
