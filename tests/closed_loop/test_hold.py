@@ -104,16 +104,30 @@ def test_it_arrives_when_it_is_released(base, number):
     assert carried_on(scenario, loop, invariants, context, 0.0, 60.0)[-1].arrived
 
 
-def held_scenario(hold, deployment=None):
+def held_run(hold, robots=None, *, arrives=True, max_time=30.0, **departures):
+    """The log of a held run at 200 Hz with departures of robots and team, and the times at which it was held."""
     scenario, plan = small_problem("base")
-    return replace(scenario, control=Control(hold=hold), deployment=deployment or Deployment()), plan
+    deployment = Deployment(control_rate=200.0, robots=robots or {}, **departures)
+    simulator = replace(scenario.simulator, max_time=max_time)
+    scenario = replace(scenario, control=Control(hold=hold), deployment=deployment, simulator=simulator)
+    log = simulate(scenario, plan, small_maps())
+    if arrives:
+        assert (log.reached, log.violation) == (True, "")
+        assert verified_run(scenario, plan, log).answer == "arrived"
+    return log, log.times[log.held > 0.0]
+
+
+def assert_rests(log, begin, end):
+    """Between two times [s] nothing moves."""
+    assert np.abs(log.object_twist[(log.times > begin) & (log.times < end)]).max() < RATE
 
 
 @pytest.mark.slow
 def test_a_scheduled_hold_costs_its_time_and_no_more():
-    scenario, plan = held_scenario(Hold(at=(0.2, 0.9), duration=1.5))
+    scenario, plan = small_problem("base")
+    free = simulate(scenario, plan, small_maps())
+    scenario = replace(scenario, control=Control(hold=Hold(at=(0.2, 0.9), duration=1.5)))
     log = simulate(scenario, plan, small_maps())
-    free = simulate(replace(scenario, control=Control()), plan, small_maps())
     assert (log.reached, log.violation) == (True, "")
     told = 2.2  # from 0.2 s to 2.4 s: the second begins in the first
     assert told <= log.times[-1] - free.times[-1] <= told + 2.0
@@ -124,17 +138,11 @@ def test_a_scheduled_hold_costs_its_time_and_no_more():
 
 @pytest.mark.slow
 def test_a_silent_robot_holds_the_team_until_it_is_heard_again():
-    silent = RobotDepartures(silence=Silence(begin=0.5, duration=2.0))
-    deployment = Deployment(control_rate=200.0, robots={"robot_1": silent})
-    scenario, plan = held_scenario(Hold(silence=0.1), deployment)
-    log = simulate(scenario, plan, small_maps())
-    assert (log.reached, log.violation) == (True, "")
-    held = log.times[log.held > 0.0]
+    silent = {"robot_1": RobotDepartures(silence=Silence(begin=0.5, duration=2.0))}
+    log, held = held_run(Hold(silence=0.1), silent)
     assert 0.6 <= held[0] <= 0.65
     assert 2.45 <= held[-1] <= 2.55
-    at_rest = (log.times > 0.6 + REST_TIME) & (log.times < 2.5)
-    assert np.abs(log.object_twist[at_rest]).max() < RATE
-    assert verified_run(scenario, plan, log).answer == "arrived"
+    assert_rests(log, 0.6 + REST_TIME, 2.5)
 
 
 @pytest.mark.slow
@@ -143,57 +151,37 @@ def test_a_robot_that_misses_the_order_holds_by_itself_and_the_team_arrives(seed
     """At a random moment one robot hears nothing any more; shortly afterwards the team is told to hold."""
     generator = np.random.default_rng(seed)
     begin, told = generator.uniform(0.1, 0.9), seed % 2 == 0
-    deaf = RobotDepartures(deaf=Deafness(begin=begin, duration=2.2))
-    deployment = Deployment(
-        control_rate=200.0, messages=Messages(loss=0.2), robots={f"robot_{seed // 2}": deaf}, seed=seed
-    )
+    deaf = {f"robot_{seed // 2}": RobotDepartures(deaf=Deafness(begin=begin, duration=2.2))}
     order = Hold(at=(begin + 0.02,) if told else (), duration=1.0, silence=0.1)
-    scenario, plan = held_scenario(order, deployment)
-    log = simulate(scenario, plan, small_maps())
-    assert (log.reached, log.violation) == (True, "")
-    held = log.times[log.held > 0.0]
+    log, held = held_run(order, deaf, messages=Messages(loss=0.2), seed=seed)
     assert held[0] == pytest.approx(begin + (0.02 if told else 0.1), abs=0.05)
     assert held[-1] == pytest.approx(begin + 2.2, abs=0.05)  # it is released when that robot hears again
-    at_rest = (log.times > begin + 0.1 + REST_TIME) & (log.times < begin + 2.2)
-    assert np.abs(log.object_twist[at_rest]).max() < RATE
-    assert verified_run(scenario, plan, log).answer == "arrived"
+    assert_rests(log, begin + 0.1 + REST_TIME, begin + 2.2)
 
 
 @pytest.mark.slow
 def test_without_a_time_out_a_deaf_robot_goes_on_alone():
-    deaf = RobotDepartures(deaf=Deafness(begin=0.2, duration=1.5))
-    deployment = Deployment(control_rate=200.0, robots={"robot_0": deaf})
-    lags = []  # of the clock of robot 0
-    for silence in (0.1, None):
-        scenario, plan = held_scenario(Hold(at=(0.25,), duration=1.0, silence=silence), deployment)
-        log = simulate(scenario, plan, small_maps())
-        lags.append(log.clock_lag.max())
-    assert lags[0] == pytest.approx(1.4, abs=0.1)  # from 0.3 s, when it holds, to 1.7 s
-    assert lags[1] == 0.0
+    deaf = {"robot_0": RobotDepartures(deaf=Deafness(begin=0.2, duration=1.5))}
+    for silence, lag in ((0.1, 1.4), (None, 0.0)):  # of its clock, from 0.3 s, when it holds, to 1.7 s
+        log, _ = held_run(Hold(at=(0.25,), duration=1.0, silence=silence), deaf, arrives=False)
+        assert log.clock_lag.max() == pytest.approx(lag, abs=0.1 if lag else 0.0)
 
 
 def test_a_robot_that_is_pushed_asks_for_a_hold_until_it_has_recovered():
     push = Push("robot_0", (220.0, 0.0), time=0.5, duration=0.5)
-    scenario, plan = held_scenario(Hold(energy=3.0), Deployment(control_rate=200.0, pushes=(push,)))
-    log = simulate(scenario, plan, small_maps())
-    assert (log.reached, log.violation) == (True, "")
-    held = log.times[log.held > 0.0]
+    _, held = held_run(Hold(energy=3.0), pushes=(push,))
     assert 0.5 < held[0] < 0.6
     assert held[-1] < 2.0
-    assert verified_run(scenario, plan, log).answer == "arrived"
 
 
 def test_a_team_that_is_never_released_says_why_it_waits():
-    silent = RobotDepartures(silence=Silence(begin=0.3))
-    deployment = Deployment(control_rate=200.0, robots={"robot_0": silent})
-    scenario, plan = held_scenario(Hold(silence=0.1), deployment)
-    simulator = replace(scenario.simulator, max_time=2.0)
-    log = simulate(replace(scenario, simulator=simulator), plan, small_maps())
+    silent = {"robot_0": RobotDepartures(silence=Silence(begin=0.3))}
+    log, _ = held_run(Hold(silence=0.1), silent, arrives=False, max_time=2.0)
     assert not log.reached
     assert "it waits until the hold ends: robot 0 is not heard" in log.violation
 
 
 def test_a_hold_after_silence_needs_a_control_rate():
-    scenario, _ = held_scenario(Hold(silence=0.1))
+    scenario = replace(small_problem("base")[0], control=Control(hold=Hold(silence=0.1)))
     with pytest.raises(ScenarioError, match=r"control\.hold\.silence: 0\.1 is not allowed"):
         validate(scenario)

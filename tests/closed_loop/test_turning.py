@@ -1,4 +1,4 @@
-"""A quick turn with narrow joints: centrifugal forces, known late and with wrong masses, throw a bent arm."""
+"""Quick turns: centrifugal forces, known late and with wrong masses, throw bent arms; budgets count them."""
 
 from dataclasses import replace
 from functools import cache
@@ -8,28 +8,113 @@ import pytest
 from shapely import box
 
 from coop_drake.answers.plan import Cell
+from coop_drake.errors import RefusalError
 from coop_drake.laws import ScheduledGains
-from coop_drake.scenario import Deployment, Start
+from coop_drake.planning.planner import plan as make
+from coop_drake.plant import planning_problem
+from coop_drake.plant.facts import budget_of
+from coop_drake.scenario import Deployment, Goal, ObjectPose, Start
 from coop_drake.simulation import build_maps, simulate
 from coop_drake.typed_data import convert_class
+from coop_drake.verification.budget import check_budget
+from coop_drake.verification.runs.budget import check_budget_used
+from coop_drake.verification.runs.rows import Rows
 from tests.support.small_loop import joint_names
 from tests.support.small_plan import START_POSE, plan_by_hand
 from tests.support.small_scenario import small_scenario
 
-ARMS = np.array([-0.05, 0.22, 0.45, -0.95])
+ARMS = {"robot_0": (-0.05, 0.22), "robot_1": (0.45, -0.95)}
 """The second robot's arm is bent as in the cell of `elbow` in which the object turns quickest."""
+
+TURN = 1.3
+"""How far the object turns [rad]."""
+
+
+def deployed(**changes):
+    return convert_class(Deployment.completed({"preset": "mobile_base", **changes}), Deployment)
+
+
+@cache
+def planned(counted=True):
+    scenario = small_scenario("elbow")
+    pose = scenario.start.object
+    goal = ObjectPose(pose.x + 0.2, pose.y, pose.theta + TURN)
+    deployment = deployed(actuators={"base_force": None})
+    scenario = replace(
+        scenario, deployment=deployment, start=Start(pose, ARMS), limits={},
+        goal=Goal(goal, ARMS, scenario.goal.tolerances),
+    )  # fmt: skip
+    gains = ScheduledGains().for_age(deployment.command_age)
+    scenario = replace(scenario, gains=replace(scenario.gains, sets={"scheduled": gains}))
+    problem = planning_problem(scenario)
+    budget = budget_of("all", scenario, problem)
+    if not counted:
+        budget = replace(budget, bodies=(), rotors=())
+    plan = make(problem, gains, gain_set_name="scheduled", budget=budget).plan
+    return scenario, plan, build_maps(plan)
+
+
+def run_planned(mass_error, counted=True):
+    scenario, plan, maps = planned(counted)
+    deployment = replace(scenario.deployment, mass_error=mass_error)
+    return plan, simulate(replace(scenario, deployment=deployment), plan, maps)
+
+
+def spared(plan, log):
+    """By how much every axis kept more than the stated distance from its bounds, least, shape (axes,)."""
+    axes = np.column_stack([log.object_pose[:, 2], log.joints])
+    stated = np.array([one.tolerance.distance for one in plan.transitions])[log.cell_index]
+    kept = np.minimum(axes - log.funnel_lower, log.funnel_upper - axes)
+    return (kept - stated).min(axis=0)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("mass_error", [-0.2, 0.2])
+def test_axes_keep_the_stated_distances_in_a_quick_turn(mass_error):
+    plan, log = run_planned(mass_error)
+    assert (log.reached, log.violation) == (True, "")
+    assert np.abs(log.object_twist[:, 2]).max() > 1.2
+    assert max(check.tightest for check in check_budget_used(Rows(log, plan))) < 1.0
+    assert spared(plan, log).min() > 0.0
+
+
+def test_without_rate_terms_axes_come_nearer_to_their_bounds_than_stated():
+    plan, log = run_planned(-0.2, counted=False)
+    assert spared(plan, log).min() < -0.01
+    with pytest.raises(RefusalError, match="nearer to a bound of its funnel than stated"):
+        check_budget_used(Rows(log, plan))
+
+
+@pytest.mark.slow
+def test_the_plan_is_checked_with_the_bodies_of_its_team():
+    scenario, plan, _ = planned()
+    tree = planning_problem(scenario).tree
+    assert check_budget(plan, tree).tightest > 0.0
+    easily_turned = tuple((*body[:4], 0.1 * body[4], body[5]) for body in plan.budget.bodies)
+    for changes, where in (
+        ({"bodies": easily_turned}, "tolerance"),
+        ({"bodies": ((9, 1.0, 0.0, 0.0, 0.1, 0.0),)}, "budget.bodies"),
+        ({"rotors": (0.0,)}, "budget.rotors"),
+    ):
+        altered = replace(plan, budget=replace(plan.budget, **changes))
+        with pytest.raises(RefusalError) as refusal:
+            check_budget(altered, tree)
+        assert where in refusal.value.where
+    with pytest.raises(ValueError, match="expected the team"):
+        check_budget(plan)
+
 
 HALF_WIDTH = 0.03
 
 
 def turning_plan(names, gain_set):
     """Two turns of 0.6 rad in one place, with 60 mrad for every joint."""
-    room = box(2.0, 2.0, 4.4, 4.4)
+    room, arms = box(2.0, 2.0, 4.4, 4.4), np.concatenate([*ARMS.values()])
     cells = tuple(
-        Cell(np.array([lower, *(ARMS - HALF_WIDTH)]), np.array([upper, *(ARMS + HALF_WIDTH)]), room)
+        Cell(np.array([lower, *(arms - HALF_WIDTH)]), np.array([upper, *(arms + HALF_WIDTH)]), room)
         for lower, upper in ((-0.46, 0.26), (-1.12, -0.40))
     )
-    start = np.array([*START_POSE, *ARMS])
+    start = np.array([*START_POSE, *arms])
     return plan_by_hand(cells, start, np.array([3.2, 3.2, -1.04]), names, gain_set)
 
 
@@ -39,23 +124,17 @@ def maps():
 
 
 def turned(mass_error, **rule):
-    deployment = convert_class(
-        Deployment.completed({"preset": "mobile_base", "mass_error": mass_error}), Deployment
-    )
-    scenario = small_scenario("elbow")
-    plan = turning_plan(
-        joint_names(scenario), replace(ScheduledGains(), **rule).for_age(deployment.command_age)
-    )
-    joints = {"robot_0": tuple(ARMS[:2]), "robot_1": tuple(ARMS[2:])}
-    start = Start(scenario.start.object, joints)
+    deployment, scenario = deployed(mass_error=mass_error), small_scenario("elbow")
+    gains = ScheduledGains(**rule).for_age(deployment.command_age)
+    plan = turning_plan(joint_names(scenario), gains)
+    start = Start(scenario.start.object, ARMS)
     return simulate(replace(scenario, start=start, deployment=deployment), plan, maps())
 
 
 @pytest.mark.parametrize("mass_error", [-0.2, 0.2])
 def test_a_turn_as_quick_as_joints_bear_arrives(mass_error):
     log = turned(mass_error)
-    assert log.violation == ""
-    assert log.reached
+    assert (log.reached, log.violation) == (True, "")
     assert log.funnel_margin.min() > 0.002
 
 

@@ -1,4 +1,4 @@
-"""Turrets without limits carry an object through pi: planned, verified, run; sensors may show any turn."""
+"""Transports that turn joints without limits, or end off a goal in collision: planned, run, verified."""
 
 import json
 from math import pi
@@ -16,6 +16,7 @@ from coop_drake.diagram.knowledge import robot_knowledge
 from coop_drake.scenario import load_scenario
 from coop_drake.simulation import build_maps, simulate
 from tests.support.cli import invoke
+from tests.support.scenarios import write_scenario
 from tests.support.turret import write_turret
 
 SAMPLED = "deployment: {control_rate: 100}"
@@ -101,3 +102,17 @@ def test_a_plan_names_joints_whose_kind_and_limits_differ(tmp_path, kind, limits
     path = write_turret(tmp_path, 3.0, 3.3, kind=kind, limits=limits)
     planned = invoke("plan", path, "--out", tmp_path, "--json", "--effort", 0)
     assert json.loads(planned.stdout)["notes"] == [f"{note}: turret_joint"]
+
+
+def test_a_transport_ends_off_a_goal_in_collision_and_within_its_tolerance(tmp_path):
+    """The object, half a metre wide, has its middle 0.24 m from the wall; the tolerance is 0.03 m."""
+    goal = {"object": {"x": 3.2, "y": 0.24, "theta": 0.0}, "tolerances": {"position": 0.03}}
+    scenario, out = write_scenario(tmp_path / "room.scenario.yaml", goal=goal), tmp_path / "out"
+    run = invoke("run", scenario, "--out", out, "--json")
+    assert run.exit_code == 0, run.stderr
+    assert json.loads(run.stdout)["final_position_error_m"] < 0.03
+    last = json.loads((out / "plan.json").read_text())["transitions"][-1]
+    assert last["target"][1] > 0.25
+    for name, answer in (("plan.json", "found"), ("log.npz", "arrived")):
+        verified = invoke("verify", out / name, scenario, "--json")
+        assert (verified.exit_code, json.loads(verified.stdout)["answer"]) == (0, answer)
