@@ -105,7 +105,7 @@ def test_it_arrives_when_it_is_released(base, number):
 
 
 def held_run(hold, robots=None, *, arrives=True, max_time=30.0, **departures):
-    """The log of a held run at 200 Hz with departures of robots and team, and the times at which it was held."""
+    """The log of a held run at 200 Hz with departures, and the times at which it was held."""
     scenario, plan = small_problem("base")
     deployment = Deployment(control_rate=200.0, robots=robots or {}, **departures)
     simulator = replace(scenario.simulator, max_time=max_time)

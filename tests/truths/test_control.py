@@ -1,0 +1,318 @@
+"""What the laws promise: funnels, prescribed performance, governor, shares of the load, hand-overs."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+from scipy.integrate import solve_ivp
+
+from coop_drake.laws import (
+    Funnel,
+    ScheduledGains,
+    acceleration_at,
+    energy_margin,
+    funnel_bounds,
+    object_twist,
+    total_wrench,
+    tracking_energy,
+    wrench_share,
+)
+from coop_drake.laws.gains import schedule_of, scheduled_governor
+from coop_drake.laws.ppc import ramped_gain
+from coop_drake.laws.readiness import clearance_margin
+from paper.governor_run import box_clearance, run_governor, straight_field
+from tests.support.hand_over import energy_surplus, funnel_surpluses
+from tests.support.point_mass import carry_out, straight_fields
+from tests.support.prescribed import prescribed_acceleration, prescribed_energy
+from tests.support.random_plan import random_plan
+from tests.support.robot_matrices import turned
+
+law = settings(max_examples=200)
+shapes = st.sampled_from(["exponential", "quintic"])
+rates = st.floats(0.1, 20.0)
+times = st.floats(0.0, 30.0)
+fractions = st.floats(0.0, 1.0)
+
+
+@st.composite
+def funnels(draw):
+    """Return a funnel of one axis whose goal interval lies in the slice, touches it or fills it."""
+    lower, width = draw(st.floats(-7.0, 7.0)), draw(st.floats(1e-3, 7.0))
+    start, part = draw(fractions), draw(st.floats(0.01, 1.0))
+    goal_lower = lower + start * (1.0 - part) * width
+    goal_upper = min(goal_lower + part * width, lower + width)
+    arrays = [np.array([value]) for value in (lower, lower + width, goal_lower, goal_upper, draw(rates))]
+    return Funnel(*arrays, shape=draw(shapes))
+
+
+@law
+@given(funnels(), times, times)
+def test_a_funnel_contains_its_goal_and_lies_in_its_slice(funnel, one, other):
+    rounding = 1e-12
+    early, late = funnel_bounds(funnel, min(one, other)), funnel_bounds(funnel, max(one, other))
+    chain = [funnel.slice_lower, early.lower, late.lower, funnel.goal_lower]
+    assert all(below <= above + rounding for below, above in pairwise(chain))
+    chain = [funnel.goal_upper, late.upper, early.upper, funnel.slice_upper]
+    assert all(below <= above + rounding for below, above in pairwise(chain))
+    assert funnel.goal_lower < funnel.goal_upper
+
+
+@law
+@given(funnels(), times)
+def test_rates_and_accelerations_of_the_walls_are_their_derivatives(funnel, time):
+    h = 1e-5 / funnel.decay_rate[0]
+    time = time + h
+    bounds = funnel_bounds(funnel, time)
+    ahead, behind = funnel_bounds(funnel, time + h), funnel_bounds(funnel, time - h)
+    scale = 1.0 + abs(funnel.slice_lower[0]) + abs(funnel.slice_upper[0])
+    for value, derivative in (
+        ("lower", "lower_rate"),
+        ("upper", "upper_rate"),
+        ("lower_rate", "lower_acceleration"),
+        ("upper_rate", "upper_acceleration"),
+    ):
+        numeric = (getattr(ahead, value) - getattr(behind, value)) / (2.0 * h)
+        # A value of size 15 is known to 2e-15; divided by 2 h it is known to some 1e-10 of the slope's scale.
+        tolerance = 1e-8 * scale * (1.0 + funnel.decay_rate[0]) ** 3
+        assert getattr(bounds, derivative) == pytest.approx(numeric, abs=tolerance)
+
+
+inside = st.floats(0.05, 0.95)
+speeds = st.floats(-1.0, 1.0)
+log_gains = st.floats(0.01, 1.0)
+gains = st.floats(0.5, 10.0)
+
+
+def energy_and_terms(x, v, bounds, kappa, k1):
+    """Return V, s and x' - v, computed apart from the law itself."""
+    dl, du = x - bounds.lower[0], bounds.upper[0] - x
+    s = np.log(dl / du)
+    wanted = (bounds.lower_rate[0] * du + bounds.upper_rate[0] * dl - k1 * s * dl * du) / (dl + du)
+    return 0.5 * kappa * s**2 + 0.5 * (v - wanted) ** 2, s, v - wanted
+
+
+@settings(max_examples=200)
+@given(
+    funnels(), st.floats(0.0, 3.0), inside, speeds, log_gains, gains, gains, st.sampled_from([0.0, 2.0, 8.0])
+)
+def test_the_energy_decays_as_predicted(funnel, time, fraction, v, kappa, gain, k2, mu):
+    """V' along the flow, by central differences of V, is -kappa k1 s^2 - k2 (x' - v)^2, also in a ramp."""
+    time = time + 1e-3
+    k1, k1_rate = ramped_gain(time, gain, mu)
+    bounds = funnel_bounds(funnel, time)
+    x = (1.0 - fraction) * bounds.lower + fraction * bounds.upper
+    width = (bounds.upper - bounds.lower)[0]
+    v *= width
+    law = {"log_gain": np.array([kappa]), "position_gain": k1, "rate_gain": k2}
+    acceleration = prescribed_acceleration(x, np.array([v]), bounds, **law, position_gain_rate=k1_rate)[0]
+    value, s, error = energy_and_terms(x[0], v, bounds, kappa, k1)
+    assert prescribed_energy(x, np.array([v]), bounds, log_gain=law["log_gain"], position_gain=k1)[0] == (
+        pytest.approx(value, rel=1e-9, abs=1e-12)
+    )
+    h = 1e-5 / (
+        1.0 + gain + k2 + mu + funnel.decay_rate[0] + abs(v) / width + np.sqrt(abs(acceleration) / width)
+    )
+
+    def along(step):
+        moved = x[0] + v * step + 0.5 * acceleration * step**2
+        return energy_and_terms(
+            moved,
+            v + acceleration * step,
+            funnel_bounds(funnel, time + step),
+            kappa,
+            ramped_gain(time + step, gain, mu)[0],
+        )[0]
+
+    numeric = (along(h) - along(-h)) / (2.0 * h)
+    predicted = -kappa * k1 * s**2 - k2 * error**2
+    # Rounding of the positions moves V by its slope in x, and the difference over 2 h magnifies that.
+    rounding = 2.0**-52 * (1.0 + abs(x[0]))
+    slope = kappa * abs(s) / (fraction * (1.0 - fraction) * width)
+    slope += abs(error) * (gain * (1.0 + abs(s)) + funnel.decay_rate[0] * 10.0)
+    noise = 4.0 * (rounding * slope + 2.0**-52 * (1.0 + value)) / h
+    assert numeric == pytest.approx(predicted, rel=1e-5, abs=noise + 1e-6 * value)
+
+
+@pytest.mark.slow
+@settings(max_examples=25)
+@given(
+    st.sampled_from(["exponential", "quintic"]),
+    st.floats(0.2, 0.5),
+    st.floats(0.0, 1.0),
+    inside,
+    speeds,
+    st.floats(1.0, 8.0),
+    st.sampled_from([(1.0, 1.0, 1.0, 0.0), (0.1, 1.0, 8.0, 0.0), (0.05, 11.2, 28.0, 8.4)]),
+)
+def test_an_axis_stays_in_its_funnel_and_ends_in_the_middle_of_its_goal(
+    shape, part, place, start, speed, rate, k
+):
+    """Simulated with an adaptive integrator over a funnel that closes to a part of its slice."""
+    goal_lower = place * (1.0 - part)
+    funnel = Funnel(
+        np.zeros(1),
+        np.ones(1),
+        np.array([goal_lower]),
+        np.array([goal_lower + part]),
+        np.array([rate]),
+        shape,
+    )
+    kappa, gain, k2, mu = k
+
+    def law(t):
+        return {"log_gain": np.array([kappa]), "position_gain": ramped_gain(t, gain, mu)[0]}
+
+    def flow(t, state):
+        rates = {"rate_gain": k2, "position_gain_rate": ramped_gain(t, gain, mu)[1]}
+        bounds = funnel_bounds(funnel, t)
+        return np.array(
+            [state[1], prescribed_acceleration(state[:1], state[1:], bounds, **law(t), **rates)[0]]
+        )
+
+    run = solve_ivp(flow, (0.0, 25.0), [start, speed], method="DOP853", rtol=1e-9, atol=1e-11)
+    assert run.success
+    energies = []
+    for t, x, v in zip(run.t, *run.y, strict=True):
+        bounds = funnel_bounds(funnel, t)
+        assert bounds.lower[0] < x < bounds.upper[0]
+        energies.append(prescribed_energy(np.array([x]), np.array([v]), bounds, **law(t))[0])
+    assert np.all(np.diff(energies) <= 1e-7 * (1.0 + energies[0]))
+    # V' <= -2 min(k1, k2) V, so 25 s leave e^-50 of it; the integrator leaves more.
+    assert energies[-1] < 1e-10
+    assert run.y[0, -1] == pytest.approx(goal_lower + 0.5 * part, abs=1e-4)
+
+
+LOWER, UPPER = np.array([0.0, -1.0]), np.array([4.0, 1.0])
+places = st.tuples(st.floats(0.02, 0.98), st.floats(0.02, 0.98)).map(np.array)
+table_2 = (50.0, 5.0, 5.0)
+scheduled = [(k, np.sqrt(k), 0.8 * np.sqrt(k)) for k in (50.0, 400.0)]
+
+
+@pytest.mark.slow
+@settings(max_examples=20)
+@given(
+    st.sampled_from([table_2, *scheduled]),
+    st.sampled_from([0.0, 0.001]),
+    places,
+    places,
+    st.floats(-np.pi, np.pi),
+    st.sampled_from([0.0, 0.1, 0.5, 0.95]),
+    st.sampled_from([0.0, 0.3, 1.0]),
+)
+def test_the_margin_never_becomes_negative(gains, smoothing, start, target, heading, filled, split):
+    """From any start whose energy fills a part of what the clearance allows, as speed or as distance."""
+    governor, target = LOWER + start * (UPPER - LOWER), LOWER + target * (UPPER - LOWER)
+    clearance = box_clearance(LOWER, UPPER)
+    stiffness = gains[0]
+    energy = filled * energy_margin(0.0, clearance(governor), stiffness)
+    direction = np.array([np.cos(heading), np.sin(heading)])
+    velocity = np.sqrt(2.0 * split * energy) * direction
+    position = governor + np.sqrt(2.0 * (1.0 - split) * energy / stiffness) * direction
+    assume(tracking_energy(*(position - governor), *velocity, stiffness) <= energy * (1.0 + 1e-9) + 1e-12)
+    run = run_governor(
+        clearance,
+        straight_field(target),
+        position=position,
+        velocity=velocity,
+        governor=governor,
+        gains=(*gains, smoothing),
+        seconds=12.0,
+    )
+    assert run.margin.min() >= -1e-9
+    assert min(clearance(p) for p in run.position) >= 0.0
+    assert run.position[-1] == pytest.approx(target, abs=0.01)
+
+
+@settings(max_examples=10)
+@given(st.floats(0.01, 0.4), st.floats(0.01, 0.4), st.floats(0.0, 1.0), st.sampled_from([0.0, 0.001]))
+def test_every_hand_over_is_reached_and_leaves_margin(half_height, half_overlap, heading, smoothing):
+    """Two corridors of any width overlap in a box: its pole is reached with margin to spare.
+
+    The next cell has its own stiffness, and the object comes with the speed that the last one allowed.
+    """
+    here = box_clearance(LOWER, np.array([3.0 + half_overlap, 1.0]))
+    height = np.array([0.0, half_height])
+    following = box_clearance(np.array([3.0 - half_overlap, 0.0]) - height, np.array([5.0, 0.0]) + height)
+    target, inradius = np.array([3.0, 0.0]), min(half_height, half_overlap)
+    stiffness = scheduled_governor(schedule_of(ScheduledGains()), half_height)[0]
+    start = np.array([0.3, 1.8 * heading - 0.9])
+    run = run_governor(
+        here,
+        straight_field(target),
+        position=start,
+        velocity=np.zeros(2),
+        governor=start,
+        gains=(50.0, np.sqrt(50.0), 0.8 * np.sqrt(50.0), smoothing),
+        seconds=15.0,
+    )
+    margins = [
+        energy_margin(tracking_energy(*(p - g), *v, stiffness), following(g), stiffness)
+        for p, v, g in zip(run.position, run.velocity, run.governor, strict=True)
+    ]
+    ready = [clearance_margin(m, stiffness, inradius) >= 0.0 for m in margins]
+    first = ready.index(True)
+    assert following(run.position[first]) > 0.0
+    assert here(run.position[first]) > 0.0
+    # Nothing takes the readiness away again while other conditions are still waited for, once at rest.
+    assert ready[-1]
+    assert clearance_margin(margins[-1], stiffness, inradius) == pytest.approx(0.75, abs=0.01)
+
+
+lengths = st.floats(-1.0, 1.0)
+vectors = st.tuples(lengths, lengths).map(np.array)
+accelerations = st.tuples(*[st.floats(-50.0, 50.0)] * 3).map(np.array)
+
+
+@law
+@given(
+    st.lists(vectors, min_size=2, max_size=8),
+    vectors,
+    accelerations,
+    st.floats(-5.0, 5.0),
+    st.floats(0.1, 20.0),
+    st.floats(0.01, 10.0),
+    st.data(),
+)
+def test_shares_sum_to_the_command(offsets, com_offset, acceleration, rate, mass, inertia, data):
+    weights = np.array(
+        data.draw(st.lists(st.floats(0.01, 1.0), min_size=len(offsets), max_size=len(offsets)))
+    )
+    weights /= weights.sum()
+    of_com = acceleration_at(*com_offset, *acceleration, rate)
+    shares = np.array(
+        [
+            wrench_share(*(com_offset - offset), *of_com, acceleration[2], mass, inertia, weight)
+            for offset, weight in zip(offsets, weights, strict=True)
+        ]
+    )
+    commanded = np.array([mass * of_com[0], mass * of_com[1], inertia * acceleration[2]])
+    # Every robot carries its part of the force.
+    assert shares[:, :2] == pytest.approx(weights[:, None] * commanded[:2], rel=1e-12, abs=1e-12)
+    total = total_wrench(shares, np.array(offsets), com_offset, 0.0)
+    assert total == pytest.approx(commanded, rel=1e-12, abs=1e-10)
+
+
+@law
+@given(vectors, accelerations, st.floats(-3.0, 3.0))
+def test_every_robot_knows_the_same_object_twist(offset_L, twist, theta):
+    offset = turned(theta, offset_L)
+    at_grasp = np.array([twist[0] - twist[2] * offset[1], twist[1] + twist[2] * offset[0], twist[2]])
+    assert object_twist(*offset, *at_grasp) == pytest.approx(twist, rel=1e-12, abs=1e-12)
+
+
+@pytest.mark.slow
+@settings(max_examples=12)
+@given(st.integers(0, 2**32 - 1))
+def test_every_hand_over_of_a_random_plan_is_safe_and_comes(seed):
+    plan = random_plan(np.random.default_rng(seed), ("a::one", "b::one"))
+    transport = carry_out(plan, straight_fields(plan), step=0.01)
+    assert transport.stuck is None
+    assert len(transport.hand_overs) == len(plan.cells)
+    for index, state in enumerate(transport.hand_overs[:-1]):
+        assert energy_surplus(plan, index, state[:2], state[2:4], state[4:6]) >= -1e-12
+        assert funnel_surpluses(plan, index, state[6:9], state[9:]).min() >= -1e-12
+    assert transport.least_energy_margin >= 0.0
+    assert transport.least_cell_clearance > 0.0
+    assert transport.least_funnel_gap > 0.0
