@@ -1,8 +1,38 @@
+"""Prescribed performance: the law, its slopes, its clock, and the damping that limits speeds."""
+
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.integrate import solve_ivp
 
-from coop_drake.laws import Funnel, funnel_bounds
-from coop_drake.laws.ppc import ramped_gain
+from coop_drake.laws import Funnel, TransitionGains, funnel_bounds
+from coop_drake.laws.axis_table import (
+    ACCELERATION_LIMIT,
+    LAW_COLUMNS,
+    LIMIT_GAIN,
+    RATE_LIMIT,
+    axis_table,
+    bounds_of,
+    limited_row,
+    slope_bounds,
+    track_row,
+)
+from coop_drake.laws.governor import AHEAD, driving_margin, energy_margin, steady_clearance
+from coop_drake.laws.ppc import (
+    FUNNEL_SHARE,
+    HOLD_RATE,
+    SETTLING_TIME,
+    axis_bounds,
+    damped,
+    decay_factor,
+    funnel_rate,
+    lagging_clock,
+    ramped_gain,
+    slowed_bounds,
+    slowed_decay_rate,
+    speed_damping,
+)
 from tests.support.prescribed import prescribed_acceleration, prescribed_energy
 
 FUNNEL = Funnel(
@@ -12,6 +42,8 @@ FUNNEL = Funnel(
     goal_upper=np.array([1.0, 1.0, 0.2]),
     decay_rate=np.array([2.0, 4.0, 8.0]),
 )
+
+
 GAINS = {"log_gain": np.array([1.0, 0.1, 0.1]), "position_gain": 1.0, "rate_gain": 8.0}
 
 
@@ -28,35 +60,12 @@ def literal_law(x, v, bounds, kappa, k1, k2, k1_rate=0.0):
     return -k2 * (v - wanted) + wanted_rate - kappa * a * z1
 
 
-@pytest.mark.parametrize("time", [0.0, 0.1, 0.7, 5.0])
-def test_the_law_with_a_ramped_gain_is_that_of_the_paper_with_its_rate(time):
-    bounds = funnel_bounds(FUNNEL, time)
-    x, v = 0.3 * bounds.lower + 0.7 * bounds.upper, np.array([0.4, -0.3, 1.0])
-    k1, k1_rate = ramped_gain(time, 3.0, 2.0)
-    ramped = {**GAINS, "position_gain": k1, "position_gain_rate": k1_rate}
-    acceleration = prescribed_acceleration(x, v, bounds, **ramped)
-    for i in range(3):
-        kappa, walls = GAINS["log_gain"][i], [w[i] for w in bounds]
-        literal = literal_law(x[i], v[i], walls, kappa, k1, 8.0, k1_rate)
-        assert acceleration[i] == pytest.approx(literal, rel=1e-9, abs=1e-9)
-
-
 def test_a_gain_is_ramped_in_from_zero_with_its_rate():
     assert ramped_gain(0.0, 3.0, 2.0) == (0.0, 0.0)
     assert ramped_gain(50.0, 3.0, 2.0) == pytest.approx((3.0, 0.0), abs=1e-12)
     assert ramped_gain(0.7, 3.0, 0.0) == (3.0, 0.0)
     ahead, behind = (ramped_gain(0.7 + h, 3.0, 2.0)[0] for h in (1e-6, -1e-6))
     assert ramped_gain(0.7, 3.0, 2.0)[1] == pytest.approx((ahead - behind) / 2e-6, rel=1e-6)
-
-
-@pytest.mark.parametrize("time", [0.0, 0.1, 0.7, 5.0])
-def test_the_law_is_that_of_the_paper_in_its_own_letters(time):
-    bounds = funnel_bounds(FUNNEL, time)
-    x, v = 0.3 * bounds.lower + 0.7 * bounds.upper, np.array([0.4, -0.3, 1.0])
-    acceleration = prescribed_acceleration(x, v, bounds, **GAINS)
-    for i in range(3):
-        literal = literal_law(x[i], v[i], [w[i] for w in bounds], GAINS["log_gain"][i], 1.0, 8.0)
-        assert acceleration[i] == pytest.approx(literal, rel=1e-9, abs=1e-9)
 
 
 def test_rest_in_the_middle_of_still_walls_is_an_equilibrium():
@@ -98,3 +107,187 @@ def test_energy_is_the_log_term_plus_the_rate_error():
     wanted = -np.log(3.0) * 0.25 * 0.75 * (bounds.upper - bounds.lower)
     energy = prescribed_energy(x, wanted + 0.5, bounds, log_gain=GAINS["log_gain"], position_gain=1.0)
     assert energy == pytest.approx(0.5 * GAINS["log_gain"] * np.log(3.0) ** 2 + 0.125)
+
+
+@pytest.mark.parametrize("ramp", [0.0, 2.0])
+@pytest.mark.parametrize("time", [0.0, 0.1, 0.7, 5.0])
+def test_the_law_is_that_of_the_paper_in_its_own_letters(time, ramp):
+    bounds = funnel_bounds(FUNNEL, time)
+    x, v = 0.3 * bounds.lower + 0.7 * bounds.upper, np.array([0.4, -0.3, 1.0])
+    k1, k1_rate = ramped_gain(time, 3.0, ramp)
+    ramped = {**GAINS, "position_gain": k1, "position_gain_rate": k1_rate}
+    acceleration = prescribed_acceleration(x, v, bounds, **ramped)
+    for i in range(3):
+        kappa, walls = GAINS["log_gain"][i], [w[i] for w in bounds]
+        literal = literal_law(x[i], v[i], walls, kappa, k1, 8.0, k1_rate)
+        assert acceleration[i] == pytest.approx(literal, rel=1e-9, abs=1e-9)
+
+
+def row(shape="quintic", saturation=0.02):
+    one = np.ones(1)
+    funnel = Funnel(-0.1 * one, 0.3 * one, 0.05 * one, 0.12 * one, 3.0 * one, shape)
+    gains = TransitionGains(
+        stiffness=50.0, damping=5.0, governor_gain=5.0, smoothing=0.0, funnel=shape, decay_rate=3.0 * one,
+        log_gain=0.05 * one, position_gain=11.0, rate_gain=28.0, ramp_rate=8.0, saturation=saturation,
+        hand_over_time=0.0, energy_bound=one,
+    )  # fmt: skip
+    return axis_table(funnel, gains)[0]
+
+
+def inside(axis, time, share):
+    lower, upper = bounds_of(axis, time)[:2]
+    return lower + share * (upper - lower), upper - lower
+
+
+@given(
+    st.floats(0.0, 3.0),
+    st.floats(0.03, 0.97),
+    st.floats(-2.0, 2.0),
+    st.sampled_from(["quintic", "exponential"]),
+)
+def test_slopes_are_those_of_differences_of_the_law(time, share, rate, shape):
+    axis = row(shape)
+    x, width = inside(axis, time, share)
+    h = 1e-6 * width
+    by_position = (track_row(axis, time, x + h, rate)[0] - track_row(axis, time, x - h, rate)[0]) / (2 * h)
+    by_rate = (track_row(axis, time, x, rate + 1e-4)[0] - track_row(axis, time, x, rate - 1e-4)[0]) / 2e-4
+    x_lower, x_upper, v_lower, v_upper = slope_bounds(axis, time, x, 0.0, rate)
+    assert x_lower == pytest.approx(x_upper, rel=1e-9, abs=1e-9)
+    assert by_position == pytest.approx(x_lower, rel=1e-4, abs=1e-3)
+    assert (by_rate, by_rate) == pytest.approx((v_lower, v_upper), rel=1e-6, abs=1e-6)
+
+
+@given(
+    st.floats(0.0, 3.0), st.floats(0.0, 1.0), st.floats(0.0, 1.0), st.floats(-2.0, 2.0), st.floats(-0.5, 0.5)
+)
+def test_differences_of_the_law_over_an_interval_keep_within_its_slopes(time, one, other, rate, step):
+    axis = row()
+    (x, _), (y, _) = inside(axis, time, one), inside(axis, time, other)
+    x_lower, x_upper, v_lower, v_upper = slope_bounds(axis, time, 0.5 * (x + y), 0.5 * abs(x - y), rate)
+    change = track_row(axis, time, x, rate)[0] - track_row(axis, time, y, rate)[0]
+    room = 1e-9 * (1.0 + abs(x_lower) + abs(x_upper))
+    assert min(x_lower * (x - y), x_upper * (x - y)) - room <= change
+    assert change <= max(x_lower * (x - y), x_upper * (x - y)) + room
+    turned = track_row(axis, time, x, rate + step)[0] - track_row(axis, time, x, rate)[0]
+    assert min(v_lower * step, v_upper * step) - room <= turned <= max(v_lower * step, v_upper * step) + room
+
+
+@pytest.mark.parametrize("held", [0.0, 1.0])
+@pytest.mark.parametrize("start", [(0.0, 0.0, 0.0), (0.7, 0.2, 1.5), (1.0, 1.0, 0.3)])
+def test_the_closed_form_solves_the_two_lags(held, start):
+    def rates(_, state):
+        a, b, _ = state
+        return [HOLD_RATE * (held - a), HOLD_RATE * (a - b), b]
+
+    solution = solve_ivp(rates, (0.0, 0.8), start, rtol=1e-11, atol=1e-12, t_eval=[0.05, 0.3, 0.8])
+    for time, expected in zip(solution.t, solution.y.T, strict=True):
+        a, b, b_rate, lost = lagging_clock(time, held, np.array(start))
+        np.testing.assert_allclose([a, b, lost], expected, atol=1e-8)
+        assert b_rate == pytest.approx(HOLD_RATE * (a - b))
+
+
+def test_whatever_the_order_the_pace_stays_between_zero_and_one():
+    generator, state = np.random.default_rng(3), np.zeros(3)
+    for _ in range(200):
+        held, time = float(generator.integers(2)), generator.exponential(0.1)
+        a, b, _, lost = lagging_clock(time, held, state)
+        assert 0.0 <= a <= 1.0
+        assert 0.0 <= b <= 1.0
+        assert 0.0 <= lost - state[2] <= time
+        state = np.array([a, b, lost])
+
+
+def test_after_the_settling_time_the_clock_has_its_final_pace():
+    assert 1.0 - lagging_clock(SETTLING_TIME, 1.0, np.zeros(3))[1] < 1e-3
+    assert lagging_clock(SETTLING_TIME, 0.0, np.array([1.0, 1.0, 0.0]))[1] < 1e-3
+
+
+@pytest.mark.parametrize("quintic", [True, False])
+def test_rates_of_slowed_bounds_are_their_derivatives(quintic):
+    funnel, start, h = (-1.0, 0.8, -0.2, 0.1, 3.0, quintic), np.array([0.6, 0.3, 0.05]), 1e-5
+
+    def at(time):
+        _, b, b_rate, lost = lagging_clock(time, 1.0, start)
+        return slowed_bounds(axis_bounds(0.4 + time - lost, *funnel), 1.0 - b, -b_rate)
+
+    before, now, after = (np.array(at(0.1 + step)) for step in (-h, 0.0, h))
+    np.testing.assert_allclose(now[2:4], (after[:2] - before[:2]) / (2.0 * h), atol=1e-7)
+    np.testing.assert_allclose(now[4:], (after[2:4] - before[2:4]) / (2.0 * h), atol=1e-6)
+
+
+limits, gains = st.floats(0.05, 5.0), st.floats(0.5, 60.0)
+
+
+parts = st.floats(-30.0, 30.0)
+
+
+@settings(max_examples=200)
+@given(st.tuples(parts, parts), st.tuples(parts, parts), limits, gains)
+def test_damping_is_the_least_that_keeps_the_condition(acceleration, velocity, limit, gain):
+    a, v = np.array(acceleration), np.array(velocity)
+    room = 0.5 * gain * (limit**2 - v @ v)
+    damping = speed_damping(float(a @ v), float(v @ v), limit, gain)
+    assert damping >= 0.0
+    if v @ v > 1e-12:
+        assert (a - damping * v) @ v <= room + 1e-9 * (1.0 + abs(room) + abs(a @ v))
+    if damping > 0.0:
+        assert (a - damping * v) @ v == pytest.approx(room, rel=1e-9, abs=1e-9 * (1.0 + abs(a @ v)))
+    else:
+        assert a @ v <= room
+
+
+def test_without_a_limit_or_at_rest_nothing_is_damped():
+    assert speed_damping(1e6, 1e6, np.inf, 10.0) == 0.0
+    assert speed_damping(0.0, 0.0, 0.1, 10.0) == 0.0
+    assert damped(-7.0, 3.0, np.inf, 10.0) == -7.0
+    assert damped(5.0, -0.05, 0.1, 10.0) == 5.0  # braking is never limited
+
+
+@settings(max_examples=200, deadline=None, derandomize=True)
+@given(parts, st.floats(-1.0, 1.0), limits, gains, st.floats(0.1, 20.0))
+def test_no_more_than_the_limit_of_acceleration_is_commanded(acceleration, share, limit, gain, most):
+    row = np.full(LAW_COLUMNS, np.nan)
+    row[RATE_LIMIT], row[LIMIT_GAIN], row[ACCELERATION_LIMIT] = limit, gain, most
+    commanded = limited_row(row, acceleration, share * limit)
+    assert abs(commanded) <= min(abs(acceleration), most) * (1.0 + 1e-12)
+    assert commanded * share * limit <= 0.5 * gain * limit**2 * (1.0 - share**2) + 1e-9
+    row[RATE_LIMIT] = np.inf
+    assert limited_row(row, acceleration, share * limit) == np.clip(acceleration, -most, most)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_speed_that_begins_below_its_limit_stays_below_it(seed):
+    generator = np.random.default_rng(seed)
+    waves, (limit, gain) = generator.uniform(-20.0, 20.0, (2, 3)), generator.uniform([0.1, 5.0], [1.0, 30.0])
+
+    def flow(t, v):
+        a = waves @ np.sin(np.array([1.0, 3.0, 7.0]) * t + np.arange(3))
+        return a - speed_damping(float(a @ v), float(v @ v), limit, gain) * v
+
+    run = solve_ivp(
+        flow, (0.0, 2.0), [generator.uniform(0.0, limit), 0.0], method="LSODA", rtol=1e-7, atol=1e-9
+    )
+    speeds = np.hypot(*run.y)
+    assert 0.9 * limit < speeds.max() <= limit * (1.0 + 1e-5)
+
+
+@pytest.mark.parametrize("quintic", [True, False])
+def test_a_slowed_funnel_moves_at_a_share_of_the_limit(quintic):
+    limit, shrink = 0.2, 0.6
+    rate = slowed_decay_rate(13.0, shrink, quintic, limit)
+    times = np.linspace(0.0, 10.0, 20001)
+    fastest = max(abs(decay_factor(float(t), rate, quintic)[1]) for t in times) * shrink
+    assert fastest == pytest.approx(FUNNEL_SHARE * limit, rel=1e-4)
+    assert funnel_rate(rate, shrink, quintic) == pytest.approx(fastest, rel=1e-4)
+    assert slowed_decay_rate(13.0, shrink, quintic, np.inf) == 13.0
+    assert slowed_decay_rate(1e-3, shrink, quintic, limit) == 1e-3
+
+
+def test_what_drives_the_governor_counts_no_more_clearance_than_the_limit_needs():
+    steady = steady_clearance(0.3, 100.0, 14.0, 12.0)
+    most = AHEAD * steady
+    energy = 0.02
+    wide, narrow = energy_margin(energy, 2.0, 100.0), energy_margin(energy, 0.5 * most, 100.0)
+    assert driving_margin(wide, 2.0, steady, 100.0) == pytest.approx(energy_margin(energy, most, 100.0))
+    assert driving_margin(narrow, 0.5 * most, steady, 100.0) == narrow
+    assert driving_margin(wide, 2.0, np.inf, 100.0) == wide

@@ -1,4 +1,7 @@
+"""Levels and margins: when a robot is ready, has arrived, asks for a hold and brakes."""
+
 from dataclasses import replace
+from math import inf
 
 import numpy as np
 import pytest
@@ -6,12 +9,169 @@ import pytest
 from coop_drake.laws import Funnel, ScheduledGains, transition_gains
 from coop_drake.laws.axis_table import axis_table
 from coop_drake.laws.gains import RestCondition
-from coop_drake.laws.readiness import axis_ready, clearance_margin, funnel_margin, interval_margin
+from coop_drake.laws.readiness import (
+    ASKS,
+    BRAKES,
+    FAR,
+    QUIET,
+    QUIET_TIME,
+    ArrivalGoal,
+    alarm_at,
+    arrival_margin,
+    axis_level,
+    axis_ready,
+    clearance_margin,
+    departing_name,
+    funnel_margin,
+    growth,
+    interval_margin,
+    mean_samples,
+    quiet_margin,
+    unseen_time,
+)
 from coop_drake.systems.kernels import ready_conditions
 from tests.support.readiness import margin_of, square_with_clearance
 
+PERIOD = 0.005
+
+
+ROWS = 2 * mean_samples(PERIOD)
+
+
+TIMES = PERIOD * np.arange(ROWS)
+
+
+PLACE = np.array([1.0, 2.0, 0.5, 0.0])
+
+
+EXACT = ArrivalGoal(PLACE, np.array([0.01, 0.02, np.inf]), np.zeros(3))
+
+
+CERTIFIED = EXACT._replace(errors=np.array([0.003, 0.002, 0.002]))
+
+
+NOISE = np.array([1e-3, 1e-3, 5e-4, 5e-4])
+
+
+def margin(samples, goal=EXACT, turned=0):
+    """Of samples from the oldest to the newest, kept in a ring that begins anywhere."""
+    return arrival_margin(*goal, np.roll(samples, turned, axis=0), (ROWS - 1 + turned) % ROWS)
+
+
+def at(*away):
+    return np.tile(PLACE + np.array(away), (ROWS, 1))
+
+
+@pytest.mark.parametrize("turned", [0, 7, ROWS - 1])
+def test_at_rest_at_the_goal_it_has_arrived_wherever_the_ring_begins(turned):
+    assert margin(at(0.0, 0.0, 0.0, 3.0), turned=turned) > 1.0 - 1e-9
+    samples = at(0.0, 0.0, 0.0, 0.0)
+    samples[: ROWS // 2, 0] += 0.05  # the older half elsewhere
+    assert margin(samples, turned=turned) < 0.0
+
+
+def test_it_measures_for_long_enough_first():
+    samples = at(0.0, 0.0, 0.0, 0.0)
+    samples[0] = np.inf
+    assert margin(samples) == FAR
+
+
+@pytest.mark.parametrize(
+    ("goal", "allowed"), [(EXACT, (0.009, 0.018)), (CERTIFIED, (0.007, 0.018))], ids=["exact", "certified"]
+)
+def test_the_mean_lies_within_the_tolerance_less_its_certified_error(goal, allowed):
+    place, angle = allowed
+    for share, arrived in ((0.999, True), (1.001, False)):
+        assert (margin(at(0.6 * share * place, 0.8 * share * place, 0.0, 0.0), goal) >= 0.0) == arrived
+        assert (margin(at(0.0, 0.0, -share * angle, 0.0), goal) >= 0.0) == arrived
+    assert margin(at(0.0, 0.0, 0.0, 5.0), goal) > 1.0 - 1e-9  # the joint is free
+
+
+@pytest.mark.parametrize(("column", "speed"), [(0, 0.01), (2, 0.02), (3, 0.02)])
+def test_what_moves_has_not_arrived(column, speed):
+    for share, arrived in ((0.9, True), (3.0, False)):
+        samples = at(0.0, 0.0, 0.0, 0.0)
+        samples[:, column] += share * speed * (TIMES - TIMES[ROWS // 2])
+        assert (margin(samples) >= 0.0) == arrived
+
+
+@pytest.mark.parametrize("size", [0.015, 0.03])
+def test_what_moves_to_and_fro_through_the_goal_has_not_arrived_at_any_moment(size):
+    for frequency in np.arange(0.5, 25.0, 0.25):
+        for phase in np.linspace(0.0, 2.0 * np.pi, 24):
+            samples = at(0.0, 0.0, 0.0, 0.0)
+            samples[:, 0] += size * np.sin(2.0 * np.pi * frequency * TIMES + phase)
+            # Slower than this, the turning point is rest for as long as a robot looks.
+            away = abs(samples[ROWS // 2 :, 0].mean() - PLACE[0])
+            assert margin(samples) < 0.0, (frequency, phase, away)
+
+
+def test_noise_does_not_keep_it_from_arriving_and_does_not_let_it_arrive_elsewhere():
+    generator = np.random.default_rng(0)
+    said = {}
+    for away, scale in ((0.0, 1.0), (0.012, 1.0), (0.012, 5.0), (0.03, 10.0)):
+        samples = at(away, 0.0, 0.0, 0.0) + scale * NOISE * generator.normal(size=(2000, ROWS, 4))
+        said[away, scale] = np.mean([margin(one) >= 0.0 for one in samples])
+    assert said[0.0, 1.0] > 0.99
+    assert said[0.012, 1.0] == 0.0
+    assert said[0.012, 5.0] < 1e-3
+    assert said[0.03, 10.0] == 0.0
+
+
+def test_a_certified_error_that_jumps_does_not_keep_it_from_arriving_for_ever():
+    goal = CERTIFIED._replace(errors=np.array([0.0024, 0.0015, 0.0015]))
+    arrived = 0
+    for phase in np.linspace(0.0, 1.0, 60):
+        samples = at(0.0, 0.0, 0.0, 0.0)
+        samples += np.outer(np.where((TIMES / 0.3 + phase) % 1.0 < 0.5, 1.0, -1.0), goal.errors[[0, 0, 1, 2]])
+        arrived += margin(samples, goal) >= 0.0
+    assert arrived > 20
+
+
+def test_a_departure_is_unseen_for_delay_report_and_one_period_in_whole_periods():
+    assert unseen_time(0.01, 0.025, 0.005, 0.0) == pytest.approx(0.04)
+    assert unseen_time(0.011, 0.0, 0.005, 0.0) == pytest.approx(0.02)
+    assert unseen_time(0.011, 0.0, 0.005, 0.001) == pytest.approx(0.021)  # what clocks hide of the age
+    assert growth(0.04, 0.2, 0.04) == pytest.approx(0.0016 + 0.00016)
+
+
+def test_the_level_of_an_axis_is_the_stated_one_or_what_its_room_leaves():
+    assert axis_level(0.02, 0.005, 0.0, -0.1, 0.1) == 0.02
+    assert axis_level(0.02, 0.005, 0.09, -0.1, 0.1) == pytest.approx(0.005)
+    assert axis_level(0.02, 0.005, -0.09, -0.1, 0.1) == pytest.approx(0.005)
+
+
+def test_a_monitor_asks_above_its_level_and_a_little_longer_and_brakes_above_twice_the_level():
+    long_ago = -1e9
+    assert alarm_at(1.0, 5.0, long_ago) == QUIET
+    assert alarm_at(1.001, 5.0, long_ago) == ASKS
+    assert alarm_at(0.0, 5.0, 5.0 - 0.5 * QUIET_TIME) == ASKS
+    assert alarm_at(0.0, 5.0, 5.0 - 1.1 * QUIET_TIME) == QUIET
+    assert alarm_at(2.001, 5.0, long_ago) == BRAKES
+    assert alarm_at(inf, 5.0, long_ago) == BRAKES
+
+
+def test_no_robot_is_ready_while_its_monitor_is_not_quiet():
+    assert quiet_margin(0.3, QUIET) == 0.3
+    assert quiet_margin(0.3, ASKS) == quiet_margin(0.3, BRAKES) == -1.0
+    assert quiet_margin(-2.0, ASKS) == -2.0
+
+
+def test_levels_have_names():
+    names = [departing_name(check, ("shoulder", "elbow")) for check in range(11)]
+    assert names[:6] == [
+        "the object's position", "the object's velocity", "its grasp", "the angle of its base",
+        "where the object goes", "the object's angle",
+    ]  # fmt: skip
+    assert names[6:] == ["shoulder", "elbow", *[f"the rate of {n}" for n in (names[5], "shoulder", "elbow")]]
+
+
 GOAL = {"goal_lower": np.array([0.8, -0.2]), "goal_upper": np.array([1.0, 0.2])}
+
+
 INTERVALS = {"slice_lower": np.array([0.0, -1.0]), "slice_upper": np.array([1.0, 1.0]), **GOAL}
+
+
 NEXT_INTERVALS = {
     "slice_lower": np.array([0.8, -0.2]),
     "slice_upper": np.array([1.8, 1.0]),
@@ -26,8 +186,14 @@ def table_of(intervals, resting):
 
 
 TABLE, _ = table_of(INTERVALS, [0.4, 0.5])
+
+
 NEXT_TABLE, NEXT_GAINS = table_of(NEXT_INTERVALS, [0.9, 0.0])
+
+
 ROW = NEXT_GAINS.governor_row(replace(NEXT_GAINS, stiffness=90.0))
+
+
 AT_REST = {
     "position": [3.0, 1.0],
     "velocity": [0.0, 0.0],
@@ -46,41 +212,6 @@ def ready(next_clearance=0.3, inradius=0.3, **change):
     return margin_of(conditions[0], **state)
 
 
-def test_a_robot_at_rest_in_the_middle_of_the_goal_is_ready():
-    assert ready() > 0.0
-
-
-@pytest.mark.parametrize(
-    "change",
-    [
-        {"axes": [0.815, 0.0]},
-        {"axes": [0.9, 0.19]},
-        {"rates": [0.0, -1.0]},
-        {"rates": [1.0, 0.0]},
-        {"velocity": [4.0, 0.0]},
-        {"position": [3.29, 1.0]},
-        {"next_clearance": 0.1},
-        {"next_clearance": -0.3},
-    ],
-)
-def test_every_condition_alone_keeps_a_robot_from_being_ready(change):
-    assert ready(**change) < 0.0
-
-
-def test_intervals_are_eroded_by_a_tenth_of_their_width():
-    assert interval_margin(0.5, 0.0, 1.0) == 1.0
-    assert interval_margin(0.1, 0.0, 1.0) == pytest.approx(0.0, abs=1e-15)
-    assert interval_margin(0.9, -1.0, 1.0) < 0.0
-    assert interval_margin(0.9, -1.0, 1.0, 0.0) == pytest.approx(0.1)
-
-
-def test_clearance_counts_from_half_the_inradius():
-    floor = 0.5 * 100.0 * 0.15**2
-    assert clearance_margin(floor, 100.0, 0.3) == 0.0
-    assert clearance_margin(2.0 * floor, 100.0, 0.3) == pytest.approx(0.5)
-    assert clearance_margin(-floor, 100.0, 0.3) == pytest.approx(-2.0)
-
-
 def test_the_next_cell_is_judged_by_the_stiffness_that_it_is_entered_with():
     """With K = 90 and d = 0.02 m there is room for 0.164 m/s, whatever the cell's own K of 100."""
     assert NEXT_GAINS.stiffness == 100.0
@@ -92,12 +223,6 @@ def test_the_next_cell_is_judged_by_the_stiffness_that_it_is_entered_with():
 def test_a_robot_is_ready_only_once_the_last_hand_over_is_over():
     assert ready(time=NEXT_GAINS.hand_over_time) >= 0.0
     assert ready(time=0.9 * NEXT_GAINS.hand_over_time) < 0.0
-
-
-def test_the_funnel_margin_vanishes_at_the_energy_bound():
-    assert funnel_margin(0.3, 0.3) == 0.0
-    assert funnel_margin(0.0, 0.3) == 1.0
-    assert funnel_margin(0.6, 0.3) == pytest.approx(-0.5)
 
 
 def test_a_cell_that_is_left_at_rest_asks_for_place_and_rate_in_place_of_the_energy():
@@ -115,16 +240,38 @@ def test_a_cell_that_is_left_at_rest_asks_for_place_and_rate_in_place_of_the_ene
     assert axis_ready(alone[0], NEXT_TABLE[1], 0.0, 0.15) == pytest.approx(0.5)
 
 
-ARRIVED = {
-    "position": [5.0, 8.004],
-    "velocity": [0.0, 0.004],
-    "governor_position": [5.0, 8.0],
-    "axes": [4.66, 0.3],
-    "rates": [0.01, 0.0],
-}
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"axes": [0.815, 0.0]},
+        {"axes": [0.9, 0.19]},
+        {"rates": [0.0, -1.0]},
+        {"rates": [1.0, 0.0]},
+        {"velocity": [4.0, 0.0]},
+        {"position": [3.29, 1.0]},
+        {"next_clearance": 0.1},
+        {"next_clearance": -0.3},
+    ],
+)
+def test_a_robot_at_rest_in_the_middle_of_the_goal_is_ready_unless_one_condition_fails(change):
+    assert ready() > 0.0 > ready(**change)
 
 
-def arrival(**change):
+def test_margins_by_hand():
+    """Intervals count less a tenth of their width, clearance from half the inradius, energy to its bound."""
+    assert interval_margin(0.5, 0.0, 1.0) == 1.0
+    assert interval_margin(0.1, 0.0, 1.0) == pytest.approx(0.0, abs=1e-15)
+    assert interval_margin(0.9, -1.0, 1.0) < 0.0
+    assert interval_margin(0.9, -1.0, 1.0, 0.0) == pytest.approx(0.1)
+    floor = 0.5 * 100.0 * 0.15**2
+    assert [clearance_margin(share * floor, 100.0, 0.3) for share in (1.0, 2.0, -1.0)] == [
+        0.0, pytest.approx(0.5), pytest.approx(-2.0)
+    ]  # fmt: skip
+    assert [funnel_margin(energy, 0.3) for energy in (0.3, 0.0, 0.6)] == [0.0, 1.0, pytest.approx(-0.5)]
+
+
+def arrival(position=(5.0, 8.004), velocity=(0.0, 0.004), axes=(4.66, 0.3), rates=(0.01, 0.0)):
+    """The margin in the last cell, whose goal is (5, 8) and 4.663 rad."""
     intervals = {
         "slice_lower": np.array([4.0, -1.0]),
         "slice_upper": np.array([5.0, 1.0]),
@@ -132,15 +279,10 @@ def arrival(**change):
         "goal_upper": np.array([4.683, 1.0]),
     }
     table, gains = table_of(intervals, [4.5, 0.0])
-    edges = square_with_clearance([5.0, 8.0], 0.3)
-    conditions = ready_conditions(
-        [table], [edges], [gains.governor_row(gains)], [0.3], np.array([5.0, 8.0]), 0.01
-    )
-    return margin_of(conditions[0], **{**ARRIVED, **change})
-
-
-def test_arrival_needs_place_angle_and_rest():
-    assert arrival() > 0.0
+    goal = np.array([5.0, 8.0])
+    edges, row = square_with_clearance(goal, 0.3), gains.governor_row(gains)
+    conditions = ready_conditions([table], [edges], [row], [0.3], goal, 0.01)
+    return margin_of(conditions[0], position, velocity, goal, axes, rates)
 
 
 @pytest.mark.parametrize(
@@ -152,5 +294,5 @@ def test_arrival_needs_place_angle_and_rest():
         {"rates": [0.01, -0.03]},
     ],
 )
-def test_every_condition_alone_delays_arrival(change):
-    assert arrival(**change) < 0.0
+def test_arrival_needs_place_angle_and_rest_and_each_alone_delays_it(change):
+    assert arrival() > 0.0 > arrival(**change)

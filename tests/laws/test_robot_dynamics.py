@@ -1,9 +1,16 @@
+"""A robot's effort moves the grasp as commanded; the team's efforts move the object and share its load."""
+
 import numpy as np
 import pytest
 
-from coop_drake.laws.robot_dynamics import end_effector_command, estimate_object, motion_room, robot_effort
+from coop_drake.laws import acceleration_at, total_wrench, wrench_share
+from coop_drake.laws.robot_dynamics import (
+    end_effector_command,
+    motion_room,
+    robot_effort,
+)
 from tests.support.planar_arm import random_arm, random_state
-from tests.support.robot_matrices import consistent_projector, grasp_matrix, robot_acceleration
+from tests.support.robot_matrices import grasp_matrix, robot_acceleration, turned
 
 
 @pytest.mark.parametrize("joints", [0, 1, 2, 4])
@@ -20,24 +27,6 @@ def test_the_closed_form_of_the_arm_satisfies_the_equations_of_motion(joints):
     ahead, behind = arm.end_effector(z + h * v, v)[1], arm.end_effector(z - h * v, v)[1]
     assert rate_term == pytest.approx((ahead - behind) @ v / (2.0 * h), abs=1e-7)
     assert jacobian.shape == (3, 3 + joints)
-
-
-@pytest.mark.parametrize("joints", [0, 1, 2, 4])
-def test_end_effector_and_joints_accelerate_as_asked(joints):
-    """Solve the equations of motion (2) with the effort of the law and the object's reaction."""
-    rng = np.random.default_rng(10 + joints)
-    arm = random_arm(rng, joints)
-    z, v = random_state(rng, joints)
-    _, jacobian, rate_term = arm.end_effector(z, v)
-    mass_matrix, bias = arm.dynamics(z, v)
-    command, axes, effort = rng.normal(size=6), rng.normal(size=1 + joints), np.empty(3 + joints)
-    robot, chain, seen = np.concatenate([z, v]), arm.chain(), np.empty(6)
-    robot_effort(chain, motion_room(chain), robot, command, axes, effort)
-    acceleration = np.linalg.solve(mass_matrix, effort - bias - jacobian.T @ command[3:])
-    assert jacobian @ acceleration + rate_term == pytest.approx(command[:3], abs=1e-10)
-    assert acceleration[3:] == pytest.approx(axes[1:], abs=1e-10)
-    estimate_object(chain, np.zeros(2), motion_room(chain), robot, np.zeros(3), seen)
-    assert seen[3:] == pytest.approx(jacobian @ v)
 
 
 @pytest.mark.parametrize("joints", [(1, 1), (2, 1, 3), (1, 0, 2, 1, 2)])
@@ -93,16 +82,54 @@ def test_the_team_moves_the_object_as_commanded_and_loads_every_grasp_by_its_sha
     assert solution[3:] == pytest.approx(expected, abs=1e-9)
 
 
-@pytest.mark.parametrize("joints", [1, 2, 3])
-def test_projected_forces_leave_the_end_effector_alone(joints):
-    rng = np.random.default_rng(joints)
-    arm = random_arm(rng, joints)
-    z, v = random_state(rng, joints)
-    _, jacobian, _ = arm.end_effector(z, v)
-    mass_matrix, _ = arm.dynamics(z, v)
-    projector = consistent_projector(mass_matrix, jacobian)
-    assert projector @ projector == pytest.approx(projector, abs=1e-10)
-    assert jacobian @ np.linalg.solve(mass_matrix, projector) == pytest.approx(
-        np.zeros((3, 3 + joints)), abs=1e-10
-    )
-    assert np.linalg.matrix_rank(projector, tol=1e-8) == joints
+OFFSET = np.array([0.4, -0.1])
+
+
+def test_acceleration_at_a_point_is_the_second_derivative_of_its_path():
+    acceleration, velocity, rate, alpha = np.array([0.5, -1.0]), np.array([0.2, 0.1]), 0.9, -2.0
+
+    def path(t):
+        return velocity * t + 0.5 * acceleration * t**2 + turned(rate * t + 0.5 * alpha * t**2, OFFSET)
+
+    h = 1e-4
+    numeric = (path(h) - 2.0 * path(0.0) + path(-h)) / h**2
+    assert acceleration_at(*OFFSET, *acceleration, alpha, rate) == pytest.approx(numeric, abs=1e-6)
+
+
+def test_an_object_spinning_about_its_origin_needs_a_force_when_its_mass_is_elsewhere():
+    com_offset = np.array([0.1, 0.0])
+    of_com = acceleration_at(*com_offset, 0.0, 0.0, 0.0, 2.0)
+    assert wrench_share(*com_offset, *of_com, 0.0, 3.0, 1.0, 0.5) == pytest.approx([-0.6, 0.0, 0.0])
+
+
+def test_a_force_beside_the_centre_of_mass_turns_the_object():
+    wrench = total_wrench(np.array([[0.0, 2.0, 0.5]]), np.array([[0.5, 0.0]]), np.array([0.1, 0.0]), 0.0)
+    assert wrench == pytest.approx([0.0, 2.0, 1.3])
+
+
+def test_a_wrench_turns_with_the_object():
+    generator = np.random.default_rng(2)
+    wrenches, grasps, p_LLcm = generator.normal(size=(4, 3)), generator.normal(size=(4, 2)), OFFSET
+    forces = np.array([turned(0.7, force) for force in wrenches[:, :2]])
+    expected = total_wrench(wrenches, grasps, p_LLcm, 0.0)
+    found = total_wrench(np.hstack([forces, wrenches[:, 2:]]), grasps, p_LLcm, 0.7)
+    assert found == pytest.approx([*turned(0.7, expected[:2]), expected[2]])
+
+
+def test_end_effectors_of_a_team_do_what_moves_the_object():
+    """The commands of a whole team: rigid motion of every grasp, and the wrench that the object needs."""
+    generator, p_LLcm, mass, inertia = np.random.default_rng(3), np.array([0.05, -0.12]), 1.7, 0.6
+    grasps, shares = generator.normal(size=(3, 2)), np.array([0.5, 0.2, 0.3])
+    state, linear, alpha = generator.normal(size=6), generator.normal(size=2), 0.8
+    commands = np.empty((3, 6))
+    for grasp, share, command in zip(grasps, shares, commands, strict=True):
+        load = np.array([*grasp, *p_LLcm, mass, inertia, share])
+        end_effector_command(load, state, linear, np.array([alpha, 9.0]), command)
+        centripetal = np.array([*(-(state[5] ** 2) * turned(state[2], grasp)), 0.0])
+        expected = grasp_matrix(turned(state[2], grasp)) @ [*linear, alpha] + centripetal
+        assert command[:3] == pytest.approx(expected)
+    of_com = acceleration_at(*turned(state[2], p_LLcm), *linear, alpha, state[5])
+    needed = [mass * of_com[0], mass * of_com[1], inertia * alpha]
+    wrenches = np.ascontiguousarray(commands[:, 3:])
+    assert total_wrench(wrenches, grasps, p_LLcm, state[2]) == pytest.approx(needed)
+    assert wrenches[:, :2] == pytest.approx(np.outer(shares, needed[:2]))

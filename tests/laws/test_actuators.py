@@ -1,4 +1,4 @@
-"""Drives brake with efforts in proportion to the inertia of their robot, against every rate."""
+"""Brakes of the drives, and the slow way on which a cell is begun anew."""
 
 from dataclasses import replace
 
@@ -9,11 +9,56 @@ from hypothesis import strategies as st
 from pydrake.systems.framework import DiagramBuilder
 
 from coop_drake.diagram import brakes_of
-from coop_drake.laws.actuators import RETURN_RATE, Brake, braking_damping, braking_effort
+from coop_drake.laws.actuators import (
+    ACCELERATION,
+    RATE,
+    RETURN_RATE,
+    USED,
+    Brake,
+    braking_damping,
+    braking_effort,
+    closed_after,
+    slow_motion,
+    slow_samples,
+)
+from coop_drake.laws.axis_table import DECAY_RATE, FADING_TIME, LAW_COLUMNS, RAMP_RATE, bounds_of
 from coop_drake.plant import build_team_plant
 from coop_drake.plant.team import base_inertia
 from coop_drake.scenario import ActuatorLimits
 from tests.support.small_scenario import small_scenario
+
+
+@pytest.mark.parametrize("share", [1.0, 0.25])
+@pytest.mark.parametrize("distance", [1e-4, 0.05, 0.4, 3.0])
+def test_the_way_keeps_to_its_bounds_and_ends_at_rest(distance, share):
+    T = 0.005
+    samples = slow_samples(distance, T, share)
+    ends = np.array([[1.0, 0.2], [1.0 - distance, 0.2]])
+    motions = [slow_motion(ends, k * T, samples * T) for k in range(samples + 1)]
+    x, v, a = (np.array(part) for part in zip(*motions, strict=True))
+    assert (x[0], x[-1]) == (pytest.approx(ends[0]), pytest.approx(ends[1]))
+    assert np.abs([v[0], v[-1], a[0], a[-1]]).max() < 1e-12
+    assert np.abs(v).max() <= USED * share * RATE
+    assert np.abs(a).max() <= USED * share * ACCELERATION
+    assert np.gradient(x[:, 0], T)[1:-1] == pytest.approx(v[1:-1, 0], abs=2e-3 * USED * RATE)
+    assert (x[:, 1] == 0.2).all()
+
+
+def test_before_and_after_it_nothing_moves():
+    for time in (-1.0, 7.0):
+        x, v, a = slow_motion(np.array([[0.0], [1.0]]), time, 3.0)
+        assert (x[0], v[0], a[0]) == (float(time > 0.0), 0.0, 0.0)
+
+
+def test_funnels_are_closed_gains_ramped_and_jumps_faded_when_the_law_takes_over():
+    table = np.ones((2, LAW_COLUMNS))
+    table[:, :4] = [-0.3, 0.3, -0.05, 0.05]
+    table[:, DECAY_RATE], table[:, RAMP_RATE], table[:, FADING_TIME] = [10.0, 5.0], [2.0, 0.0], 0.4
+    time = closed_after(table)
+    assert time == pytest.approx(3.0)
+    for row in table:
+        assert bounds_of(row, time)[:4] == pytest.approx((-0.05, 0.05, 0.0, 0.0))
+
 
 FREE = np.full(3, np.inf)
 
