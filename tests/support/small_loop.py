@@ -8,11 +8,13 @@ from pydrake.systems.framework import DiagramBuilder
 
 from coop_drake.answers.plan import Plan
 from coop_drake.diagram import ClosedLoop, build_closed_loop
-from coop_drake.harmonic_maps import HarmonicMap
+from coop_drake.geometry.polygons import BoundaryDistance
+from coop_drake.harmonic_maps import HarmonicMap, VelocityField
 from coop_drake.laws import GainSet
 from coop_drake.plant import build_team_plant
 from coop_drake.scenario import Scenario
 from coop_drake.simulation import build_maps
+from coop_drake.systems import GovernedCell
 from tests.support.small_plan import small_plan
 from tests.support.small_scenario import small_scenario
 
@@ -40,3 +42,11 @@ def small_loop(team: str = "base", gain_set: GainSet | None = None) -> ClosedLoo
     """The closed loop of a team."""
     scenario, plan = small_problem(team, gain_set)
     return build_closed_loop(scenario, plan, small_maps())
+
+
+def governed_cells(plan: Plan) -> list[GovernedCell]:
+    """Clearance, field and gains of every cell of a hand-written plan."""
+    return [
+        GovernedCell(BoundaryDistance(cell.tidied), VelocityField(field_map), transition.gains)
+        for cell, field_map, transition in zip(plan.cells, small_maps(), plan.transitions, strict=True)
+    ]

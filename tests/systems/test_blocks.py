@@ -1,9 +1,10 @@
-"""Every block's docstring lists its ports and its state, and what it lists is so."""
+"""Every block: its table of ports and its state, and which arguments are refused."""
 
 import inspect
 import re
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from pydrake.systems.framework import Diagram, LeafSystem
 
@@ -26,16 +27,34 @@ from coop_drake.scenario import (
     WheelSlip,
 )
 from coop_drake.simulation import build_maps
+from coop_drake.systems import (
+    AxisPpc,
+    CellPlanner,
+    DisturbanceObserver,
+    FloorFriction,
+    Interruption,
+    LaggingEffort,
+    LimitedEffort,
+    LossyMeasurement,
+    MeasurementNoise,
+    MessageChannel,
+    ReadyMonitor,
+    ReferenceGovernor,
+    WrenchLaw,
+)
 from tests.support.small_loop import small_maps, small_problem
 from tests.support.system_checks import SIZE_OF_ABSTRACT, port_sizes, state_of
 from tests.support.tubes import WITH_AXES, tubed_problem
 
 ROW = re.compile(r"^ *(input|output) +``(\S+)`` +(\S(?:.*?\S)?)(?:  |$)", re.MULTILINE)
+
+
 BLOCKS = sorted(
     name
     for name, thing in vars(systems).items()
     if inspect.isclass(thing) and issubclass(thing, LeafSystem) and thing is not systems.Block
 )
+
 
 EVERYTHING = Deployment(
     control_rate=100.0,
@@ -136,3 +155,49 @@ def test_only_switches_jumps_holds_what_is_predicted_and_what_models_failures_ar
         "NominalGovernor",
     }
     assert remembering == laws | holds | failures | {"TeamLink", "DepartureMonitor"}
+
+
+WAVES = np.array([[0.3, 4.0, 0.0], [0.0, 1.0, 0.0]])
+LOAD = {"p_LLcm": np.zeros(2), "mass": 1.0, "inertia": 1.0, "share": 0.5, "joints": 0}
+REFUSED = [
+    (CellPlanner, (0, 3), {}, "at least one robot and one cell, not 0 and 3"),
+    (CellPlanner, (2, 0), {}, "at least one robot and one cell, not 2 and 0"),
+    (CellPlanner, (2, 3), {"period": 0.0}, "period must be positive, not 0.0"),
+    (CellPlanner, (2, 3), {"period": -1.0}, "period must be positive, not -1.0"),
+    (DisturbanceObserver, (1, 0.0, 1.0), {}, "a positive gain and no negative leak"),
+    (DisturbanceObserver, (1, 5.0, -1.0), {}, "a positive gain and no negative leak"),
+    (FloorFriction, ([1], -1.0, 0.0), {}, "no negative friction"),
+    (FloorFriction, ([1], 0.0, -1.0), {}, "no negative friction"),
+    (Interruption, (1, 0.0), {"begin": 1.0}, "positive period and duration"),
+    (Interruption, (1, 0.1), {"begin": 1.0, "duration": 0.0}, "positive period and duration"),
+    (LaggingEffort, (2, 0.0, 0.02), {}, "needs a positive lag and period"),
+    (LaggingEffort, (2, -0.03, 0.02), {}, "needs a positive lag and period"),
+    (LaggingEffort, (2, 0.03, 0.0), {}, "needs a positive lag and period"),
+    (LimitedEffort, (np.array([1.0, 0.0]),), {}, "needs positive limits"),
+    (LossyMeasurement, (1, 0.0), {}, "positive period"),
+    (LossyMeasurement, (1, 0.1), {"late_by": -1.0}, "no negative delay"),
+    (LossyMeasurement, (1, 0.1), {"loss": 1.5}, "probabilities"),
+    (LossyMeasurement, (1, 0.1), {"late": -0.5}, "probabilities"),
+    (MeasurementNoise, (np.ones(2), WAVES, 0.0, 1), {}, "no negative deviation and waves of positive length"),
+    (MeasurementNoise, (-np.ones(2), WAVES, 0.1, 1), {}, "no negative deviation and waves of"),
+    (MeasurementNoise, (np.ones(2), 0.0 * WAVES, 0.1, 1), {}, "no negative deviation and waves of"),
+    (MessageChannel, (0.0,), {}, "positive period"),
+    (MessageChannel, (0.1,), {"delay": -1.0}, "no negative delay"),
+    (MessageChannel, (0.1,), {"loss": 1.5}, "probabilities must lie in"),
+    (MessageChannel, (0.1,), {"repeat": np.nan}, "probabilities must lie in"),
+    (WrenchLaw, (np.zeros(2),), LOAD | {"mass": 0.0}, "needs positive mass and inertia, not"),
+    (WrenchLaw, (np.zeros(2),), LOAD | {"inertia": -1.0}, "needs positive mass and inertia, not"),
+    (WrenchLaw, (np.zeros(2),), LOAD | {"mass": np.nan}, "needs positive mass and inertia, not"),
+    (WrenchLaw, (np.zeros(2),), LOAD | {"share": -0.1}, "share must lie in"),
+    (WrenchLaw, (np.zeros(2),), LOAD | {"share": 1.1}, "share must lie in"),
+    (WrenchLaw, (np.zeros(2),), LOAD | {"share": np.nan}, "share must lie in"),
+    (AxisPpc, ([],), {}, "AxisPpc needs one law for each cell, all of the same axes"),
+    (ReferenceGovernor, ([],), {}, "ReferenceGovernor needs at least one cell"),
+    (ReadyMonitor, ([], [], [], np.zeros(2), 0.01), {}, "one inradius for each cell, not 0, 0 and 0"),
+]
+
+
+@pytest.mark.parametrize(("block", "arguments", "more", "complaint"), REFUSED)
+def test_wrong_arguments_are_refused(block, arguments, more, complaint):
+    with pytest.raises(ValueError, match=complaint):
+        block(*arguments, **more)

@@ -1,4 +1,4 @@
-"""A robot's monitor compares raw measurements with the nominal motion at the instant of their stamp."""
+"""Monitors of readiness, arrival and departures say what their laws say of what is measured."""
 
 from dataclasses import replace
 from functools import cache
@@ -10,13 +10,159 @@ from pydrake.systems.analysis import Simulator
 from coop_drake.diagram import build_station
 from coop_drake.diagram.knowledge import hold_of, robot_knowledge
 from coop_drake.errors import PlanError
+from coop_drake.laws.readiness import FAR, ArrivalGoal, arrival_margin, mean_samples
 from coop_drake.scenario import Deployment, Hold, Measurements
 from coop_drake.simulation import build_maps
-from coop_drake.systems import DepartureMonitor
+from coop_drake.systems import ArrivalMonitor, DepartureMonitor, ReadyMonitor, axis_laws
+from coop_drake.systems.kernels import ready_conditions
+from tests.support.readiness import margin_of
+from tests.support.small_loop import governed_cells
+from tests.support.small_plan import GOAL_POSE, POSITION_TOLERANCE, small_plan, stiffer_and_stiffer
 from tests.support.system_checks import context_with, evaluate, port_sizes
 from tests.support.tubes import BUDGET, WITH_AXES, tubed_problem
 
+PLAN = stiffer_and_stiffer(small_plan(("a", "b", "c")))
+
+
+AXES = [0, 2, 3]
+
+
+INPUTS = {
+    "object_state": [3.8, 3.5, 0.3, 0.0, 0.0, 0.0],
+    "robot_state": [1.0, 2.0, 0.3, 0.1, 0.12, *[0.0] * 5],
+    "governor_position": [3.8, 3.5],
+    "current_cell": [0.0, 0.0],
+}
+
+
+@pytest.fixture
+def monitor(cells):
+    inradii = [transition.inradius for transition in PLAN.transitions]
+    return ReadyMonitor(cells, axis_laws(PLAN, AXES), inradii, PLAN.goal_pose[:2], POSITION_TOLERANCE)
+
+
+def conditions(cells):
+    return ready_conditions(
+        [law.table for law in axis_laws(PLAN, AXES)],
+        [cell.clearance.edges for cell in cells],
+        [cell.row for cell in cells],
+        [transition.inradius for transition in PLAN.transitions],
+        PLAN.goal_pose[:2],
+        POSITION_TOLERANCE,
+    )
+
+
+@pytest.mark.parametrize("index", [0, 1])
+def test_the_report_is_the_law_with_the_next_cells_energy(monitor, cells, index):
+    inputs = {**INPUTS, "current_cell": [index, 0.0], "object_state": [3.8, 3.5, 0.3, 0.1, 0.0, 0.05]}
+    expected = margin_of(
+        conditions(cells)[index], [3.8, 3.5], [0.1, 0.0], INPUTS["governor_position"], [0.3, 0.1, 0.12],
+        [0.05, 0.0, 0.0],
+    )  # fmt: skip
+    np.testing.assert_array_equal(evaluate(monitor, inputs, "ready", 10.0), [index, expected])
+
+
+def test_in_the_last_cell_it_reports_arrival(monitor, cells):
+    state = [0.0, 0.0, 0.0, 0.3, 0.28, 0.0, 0.0, 0.0, 0.001, 0.002]
+    inputs = {
+        **INPUTS,
+        "current_cell": [2.0, 1.0],
+        "object_state": [GOAL_POSE[0] + 0.002, GOAL_POSE[1], GOAL_POSE[2] + 0.001, 0.001, 0.0, 0.003],
+        "robot_state": state,
+    }
+    expected = margin_of(
+        conditions(cells)[2], inputs["object_state"][:2], [0.001, 0.0], [3.8, 3.5],
+        [GOAL_POSE[2] + 0.001, 0.3, 0.28], [0.003, 0.001, 0.002],
+    )  # fmt: skip
+    assert expected > 0.0
+    np.testing.assert_array_equal(evaluate(monitor, inputs, "ready", 10.0), [2.0, expected])
+
+
+def test_bad_parameters_are_refused(cells):
+    laws, goal = axis_laws(PLAN, AXES), np.zeros(2)
+    with pytest.raises(ValueError, match="one inradius for each cell, not 3, 3 and 2"):
+        ReadyMonitor(cells, laws, [0.1, 0.1], goal, 0.01)
+    with pytest.raises(ValueError, match="one inradius for each cell, not 0, 0 and 0"):
+        ReadyMonitor([], [], [], goal, 0.01)
+    with pytest.raises(ValueError, match=r"position tolerance must be positive, not 0\.0"):
+        ReadyMonitor(cells, laws, [0.1, 0.1, 0.1], goal, 0.0)
+
+
+@pytest.mark.parametrize("axes_led", [False, True])
+def test_in_the_last_cell_a_sampled_robot_says_what_it_measures_besides_what_leads_it(cells, axes_led):
+    inradii = [transition.inradius for transition in PLAN.transitions]
+    parts = cells, axis_laws(PLAN, AXES), inradii, PLAN.goal_pose[:2], POSITION_TOLERANCE
+    sampled, last = ReadyMonitor(*parts, measured=True, axes_led=axes_led), len(cells) - 1
+    middle = 0.5 * (PLAN.transitions[-1].goal_lower + PLAN.transitions[-1].goal_upper)
+    inputs = {
+        **INPUTS,
+        "object_state": [*PLAN.goal_pose[:2], middle[0], 0.0, 0.0, 0.0],
+        "robot_state": [1.0, 2.0, 0.3, middle[2], middle[3], *[0.0] * 5],
+        "current_cell": [last, 0.0],
+        "arrival": [0.4],
+    }
+    assert evaluate(sampled, inputs, "ready").tolist() == [last, 0.4]
+    assert evaluate(sampled, {**inputs, "arrival": [-1.0]}, "ready").tolist() == [last, -1.0]
+    moving = {**inputs, "object_state": [*inputs["object_state"][:5], 0.03]}
+    assert (evaluate(sampled, moving, "ready")[1] < 0.0) == axes_led  # else the rate is a noisy measurement
+    before = {**inputs, "current_cell": [0.0, 0.0], "arrival": [-1.0]}
+    expected = evaluate(ReadyMonitor(*parts), {name: before[name] for name in INPUTS}, "ready")
+    np.testing.assert_array_equal(evaluate(sampled, before, "ready"), expected)
+
+
+@pytest.fixture(scope="module")
+def cells():
+    return governed_cells(PLAN)
+
+
+PERIOD, CELLS = 0.01, 3
+
+
+ARRIVAL = ArrivalGoal(np.array([3.0, 2.0, 0.5, 0.1]), np.array([0.01, 0.02, np.inf]), np.zeros(3))
+
+
+def test_it_has_not_measured_enough_at_first_and_compares_means_in_the_last_cell_alone(arrivals):
+    simulator = Simulator(arrivals, context_with(arrivals, ARRIVING))
+    context, rows = simulator.get_mutable_context(), 2 * mean_samples(PERIOD)
+    samples = np.array([[3.001, 2.0, 0.5, 0.1]] * rows)
+    samples[:, 0] += 1e-4 * np.sin(np.arange(rows))
+    for k, sample in enumerate(samples):
+        arrivals.GetInputPort("object_pose").FixValue(context, sample[:3])
+        assert evaluate_now(arrivals, context) == FAR, k
+        simulator.AdvanceTo(PERIOD * k + 0.5 * PERIOD)
+    expected = arrival_margin(*ARRIVAL, samples, rows - 1)
+    assert 0.0 < expected < 1.0
+    assert evaluate_now(arrivals, context) == pytest.approx(expected)
+    arrivals.GetInputPort("current_cell").FixValue(context, [0.0, 0.0])
+    kept = context.get_discrete_state_vector().value().copy()
+    simulator.AdvanceTo(PERIOD * (rows + 3))
+    assert evaluate_now(arrivals, context) == FAR
+    np.testing.assert_array_equal(context.get_discrete_state_vector().value(), kept)
+
+
+def evaluate_now(arrivals, context):
+    return float(arrivals.GetOutputPort("arrival").Eval(context)[0])
+
+
+def test_before_the_last_cell_nothing_has_arrived(arrivals):
+    assert evaluate(arrivals, {**ARRIVING, "current_cell": [0.0, 0.0]}, "arrival").tolist() == [FAR]
+
+
+ARRIVING = {
+    "robot_state": [9.0, 9.0, 9.0, 0.1, 1.0, 2.0, 3.0, 4.0],
+    "object_pose": [3.001, 2.0, 0.5],
+    "current_cell": [CELLS - 1.0, 0.0],
+}
+
+
+@pytest.fixture
+def arrivals():
+    return ArrivalMonitor(ARRIVAL, CELLS, PERIOD)
+
+
 NOISY = replace(WITH_AXES, grasp_noise=0.01, turn_noise=0.006)
+
+
 DELAY = 2
 """Age of measurements in periods."""
 
@@ -52,12 +198,12 @@ def inputs(budget=NOISY):
     }  # fmt: skip
 
 
-def monitor(budget=NOISY):
+def departure_monitor(budget=NOISY):
     return DepartureMonitor(known(budget)[0].monitored)
 
 
 def test_ports_and_a_robot_at_rest_on_its_nominal_motion():
-    block, axes = monitor(), known()[0].monitored.mounting.size
+    block, axes = departure_monitor(), known()[0].monitored.mounting.size
     assert port_sizes(block) == (
         {
             "robot_state": 2 * (2 + axes), "object_pose": 3, "nominal": 6, "nominal_axes": 2 * axes,
@@ -68,8 +214,8 @@ def test_ports_and_a_robot_at_rest_on_its_nominal_motion():
     alarm, share, _ = evaluate(block, inputs(), "alarm")
     assert alarm == 0.0
     assert share == pytest.approx(0.0, abs=1e-9)
-    assert port_sizes(monitor(BUDGET))[0].keys() == {"robot_state", "object_pose", "nominal"}
-    assert evaluate(monitor(BUDGET), inputs(BUDGET), "alarm")[0] == 0.0
+    assert port_sizes(departure_monitor(BUDGET))[0].keys() == {"robot_state", "object_pose", "nominal"}
+    assert evaluate(departure_monitor(BUDGET), inputs(BUDGET), "alarm")[0] == 0.0
 
 
 def departures():
@@ -114,7 +260,7 @@ def test_what_departs_is_compared_with_its_level(check):
     level = own.levels[check] if check < 5 else own.axis_alarms[0].ravel()[check - 5]
     for share, alarm in ((0.9, 0.0), (1.1, 1.0), (2.1, 2.0)):
         measured = departures()[check](share * level)
-        found = evaluate(monitor(), inputs() | measured, "alarm")
+        found = evaluate(departure_monitor(), inputs() | measured, "alarm")
         np.testing.assert_allclose(found, [alarm, share, check], rtol=1e-3)
 
 
@@ -122,7 +268,7 @@ def test_a_base_that_is_turned_against_its_object_and_joints_is_seen():
     own, _, state = known()[0].monitored, *known()[1:]
     for share, alarm in ((0.9, 0.0), (1.1, 1.0), (2.1, 2.0)):
         turned = state + share * own.levels[3] * np.eye(len(state))[2]
-        found = evaluate(monitor(), inputs() | {"robot_state": turned}, "alarm")
+        found = evaluate(departure_monitor(), inputs() | {"robot_state": turned}, "alarm")
         np.testing.assert_allclose(found, [alarm, share, 3.0], rtol=1e-9)
 
 
@@ -131,7 +277,7 @@ def test_an_axis_near_a_bound_of_its_funnel_has_the_level_that_its_room_leaves()
     axes = np.array(given["nominal_axes"][:2])
     reserve, alarm = own.axis_reserve[1], own.axis_alarms[0, 0, 1]
     near = np.array([axes[0] - 1.0, axes[1] - 1.0, axes[0] + 1.0, axes[1] + reserve + 0.5 * alarm])
-    block, moved = monitor(), np.array([axes[0], axes[1] - 0.25 * alarm, 0.0, 0.0])
+    block, moved = departure_monitor(), np.array([axes[0], axes[1] - 0.25 * alarm, 0.0, 0.0])
     simulator = Simulator(block, context_with(block, given | {"funnels": near, "nominal_axes": moved}))
     simulator.AdvanceTo((DELAY + 0.5) * own.period)
     alarm_now, share, which = block.GetOutputPort("alarm").Eval(simulator.get_context())
@@ -140,7 +286,7 @@ def test_an_axis_near_a_bound_of_its_funnel_has_the_level_that_its_room_leaves()
 
 
 def test_measurements_are_compared_with_the_nominal_state_of_their_stamp():
-    block, own, given = monitor(), known()[0].monitored, inputs()
+    block, own, given = departure_monitor(), known()[0].monitored, inputs()
     simulator = Simulator(block, context_with(block, given))
     context, alarm = simulator.get_mutable_context(), block.GetOutputPort("alarm")
     simulator.AdvanceTo(3.5 * own.period)
