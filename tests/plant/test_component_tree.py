@@ -1,17 +1,24 @@
-"""The component tree moves as the plant does, and its shapes stand where the collision geometry stands."""
+"""The component tree moves as the plant does, and its shapes hold the collision geometry."""
 
 import re
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from pydrake.geometry import Box, Capsule, Convex, Cylinder, Ellipsoid, Mesh, Sphere
+from pydrake.math import RigidTransform, RollPitchYaw
 from pydrake.multibody.tree import BodyIndex
-from shapely import Point
+from shapely import MultiPoint, Point, Polygon, box, points
 
 from coop_drake.errors import ScenarioError
-from coop_drake.plant import base_poses, read_component_tree, set_configuration
+from coop_drake.plant import read_component_tree, set_configuration
 from coop_drake.plant.chain import planar_pose
-from coop_drake.plant.problem import core
+from coop_drake.plant.component_tree import hull, project
+from coop_drake.plant.problem import body_clearance, core, wall_clearance
 from coop_drake.scenario import load_scenario
+from coop_drake.tree.component_tree import Body, ConvexShape
+from coop_drake.tree.pose import PlanarPose
 from tests.support.cases import CASES, case
 from tests.support.edited_scenario import shipped, team_of, write_edited, write_with_robot
 from tests.support.robot_models import Arm
@@ -108,27 +115,6 @@ def test_shipped_models_are_the_bodies_of_the_cases(name):
         assert outlines[0] == outlines[1]
 
 
-def test_bases_stand_where_the_plant_says(team):
-    tree = read_component_tree(team)
-    context = team.plant.CreateDefaultContext()
-    for z in configurations(tree, 3):
-        set_configuration(team, context, z)
-        poses = {
-            body.name: X_WC.apply(body.shapes[0].vertices)[0]
-            for X_WC, component in zip(tree.poses(z), tree.components, strict=True)
-            for body in component.bodies
-        }
-        for robot, pose in zip(team.robots, base_poses(team, context), strict=True):
-            assert poses[f"{robot.name}::base"] == pytest.approx(pose[:2], abs=1e-7)
-
-
-def test_joints_stand_in_q_from_the_base_outwards(team):
-    tree = read_component_tree(team)
-    assert tuple(joint.name for joint in tree.joints) == team.joint_names
-    for robot in team.robots:
-        assert [joint.robot for joint in tree.joints[robot.q_slice]] == [robot.index] * len(robot.joints)
-
-
 def test_welded_bodies_share_a_component_and_joined_ones_may_overlap():
     team, _builder = team_of(shipped("base"))
     tree = read_component_tree(team)
@@ -157,23 +143,6 @@ def test_collision_filter_groups_exempt_pairs(tmp_path):
     filtered, _two = team_of(load_scenario(write_edited(tmp_path, ("object: object", group))))
     lost = read_component_tree(filtered).unchecked_pairs - read_component_tree(plain).unchecked_pairs
     assert {frozenset(pair) for pair in lost} == {frozenset(("robot_0::base", "robot_0::link_2"))}
-
-
-def test_a_revolute_joint_without_limits_is_a_circle(tmp_path):
-    arm = Arm(joints=(("revolute", "0 0 1", "<limit/>"),)).text()
-    team, _builder = team_of(load_scenario(write_with_robot(tmp_path, arm)))
-    tree = read_component_tree(team)
-    assert (tree.joints[0].lower, tree.joints[0].upper) == (-np.inf, np.inf)
-    assert tree.circular[:2] == (True, True)
-    assert tree.joints[0].range == (-np.pi, np.pi)
-
-
-def test_limits_of_half_a_turn_are_no_circle(tmp_path):
-    limits = f"<limit><lower>{-np.pi}</lower><upper>{np.pi}</upper></limit>"
-    team, _builder = team_of(
-        load_scenario(write_with_robot(tmp_path, Arm(joints=(("revolute", "0 0 1", limits),)).text()))
-    )
-    assert read_component_tree(team).circular[1] is False
 
 
 @pytest.mark.parametrize(
@@ -223,3 +192,166 @@ def test_bodies_whose_footprint_cannot_be_read_are_refused(extra, value, allowed
         read_component_tree(team)
     assert caught.value.key == "directives[1]"
     assert caught.value.value == value
+
+
+@pytest.mark.parametrize(
+    ("limits", "circular", "upper"),
+    [
+        ("<limit/>", True, np.inf),
+        ("<limit><lower>-1e16</lower><upper>1e16</upper></limit>", True, np.inf),
+        (f"<limit><lower>{-np.pi}</lower><upper>{np.pi}</upper></limit>", False, np.pi),
+    ],
+)
+def test_only_a_revolute_joint_without_limits_is_a_circle(limits, circular, upper, tmp_path):
+    """Limits as far as files write for none count as none; those of half a turn do not."""
+    arm = Arm(joints=(("revolute", "0 0 1", limits),)).text()
+    team, _builder = team_of(load_scenario(write_with_robot(tmp_path, arm)))
+    tree = read_component_tree(team)
+    assert tree.joints[0].lower == -tree.joints[0].upper == -upper
+    assert tree.joints[0].range == (-np.pi, np.pi)
+    assert tree.circular[:2] == (True, circular)
+
+
+TETRAHEDRON = "v 0 0 0\nv 1 0 0\nv 0 0.7 0\nv 0 0 0.5\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n"
+
+
+def ball(count=40):
+    polar, azimuth = np.meshgrid(np.linspace(0.0, np.pi, count), np.linspace(0.0, 2.0 * np.pi, 2 * count))
+    return np.stack(
+        [np.sin(polar) * np.cos(azimuth), np.sin(polar) * np.sin(azimuth), np.cos(polar)], axis=-1
+    ).reshape(-1, 3)
+
+
+def rims(radius, length, count=400):
+    angle = np.linspace(0.0, 2.0 * np.pi, count)
+    rim = np.stack([radius * np.cos(angle), radius * np.sin(angle), np.zeros(count)], axis=-1)
+    up = np.array([0.0, 0.0, 0.5 * length])
+    return np.concatenate([rim + up, rim - up])
+
+
+def corners(size):
+    return np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)]) * size
+
+
+@pytest.fixture(scope="module")
+def tetrahedron(tmp_path_factory):
+    path = tmp_path_factory.mktemp("mesh") / "tetrahedron.obj"
+    path.write_text(TETRAHEDRON)
+    return str(path)
+
+
+def solids(mesh):
+    vertices = np.array([[0, 0, 0], [1, 0, 0], [0, 0.7, 0], [0, 0, 0.5]], dtype=float)
+    return {
+        "sphere": (Sphere(0.3), 0.3 * ball()),
+        "box": (Box(0.4, 0.2, 0.7), corners([0.4, 0.2, 0.7])),
+        "cylinder": (Cylinder(0.2, 0.6), rims(0.2, 0.6)),
+        "capsule": (
+            Capsule(0.2, 0.6),
+            np.concatenate([0.2 * ball() + [0, 0, 0.3], 0.2 * ball() - [0, 0, 0.3]]),
+        ),
+        "ellipsoid": (Ellipsoid(0.3, 0.2, 0.5), ball(80) * [0.3, 0.2, 0.5]),
+        "convex": (Convex(mesh, 1.0), vertices),
+        "mesh": (Mesh(mesh, 1.0), vertices),
+    }
+
+
+NAMES = ("sphere", "box", "cylinder", "capsule", "ellipsoid", "convex", "mesh")
+
+
+angles = st.floats(-3.2, 3.2)
+
+
+@settings(max_examples=25)
+@given(name=st.sampled_from(NAMES), roll=angles, pitch=angles, yaw=angles, x=st.floats(-2, 2))
+def test_footprint_is_the_shadow_and_a_hair(tetrahedron, name, roll, pitch, yaw, x):
+    shape, surface = solids(tetrahedron)[name]
+    X_CG = RigidTransform(RollPitchYaw(roll, pitch, yaw), [x, 0.5, 3.0])
+    found = project(shape, X_CG)
+    shadow = X_CG.multiply(surface.T).T[:, :2]
+    solid = core(found, PlanarPose())
+    assert solid.distance(points(shadow)).max() <= found.radius + 1e-9
+    grown = solid.buffer(found.radius, quad_segs=64)
+    assert grown.area <= 1.006 * MultiPoint(shadow).convex_hull.area + 1e-7
+
+
+@pytest.mark.parametrize(
+    ("shape", "roll", "vertices", "radius"),
+    [
+        (Cylinder(0.25, 0.5), 0.0, [[1, 2]], 0.25),
+        (Cylinder(0.25, 0.5), np.pi, [[1, 2]], 0.25),
+        (Cylinder(0.25, 0.5), np.pi / 2, [[0.75, 1.75], [1.25, 1.75], [1.25, 2.25], [0.75, 2.25]], 0.0),
+        (Capsule(0.1, 0.6), 0.0, [[1, 2]], 0.1),
+        (Capsule(0.1, 0.6), np.pi / 2, [[1, 1.7], [1, 2.3]], 0.1),
+        (Sphere(0.3), 0.4, [[1, 2]], 0.3),
+        (Ellipsoid(0.3, 0.3, 0.1), 0.0, [[1, 2]], 0.3),
+        (Box(0.4, 0.2, 0.6), 0.0, [[0.8, 1.9], [1.2, 1.9], [1.2, 2.1], [0.8, 2.1]], 0.0),
+        (Box(0.4, 0.2, 0.6), np.pi / 2, [[0.8, 1.7], [1.2, 1.7], [1.2, 2.3], [0.8, 2.3]], 0.0),
+    ],
+)
+def test_upright_and_lying_shapes_are_exact(shape, roll, vertices, radius):
+    found = project(shape, RigidTransform(RollPitchYaw(roll, 0.0, 0.0), [1.0, 2.0, 3.0]))
+    assert found.radius == pytest.approx(radius)
+    order = np.lexsort(found.vertices.round(9).T)
+    expected = np.array(vertices, dtype=float)
+    assert found.vertices[order] == pytest.approx(expected[np.lexsort(expected.T)], abs=1e-9)
+
+
+def test_hulls_are_counter_clockwise():
+    ring = hull(np.array([[0, 0], [0, 1], [1, 1], [1, 0], [0.5, 0.5]])).vertices
+    x, y = ring.T
+    assert len(ring) == 4
+    assert 0.5 * np.sum(x * np.roll(y, -1) - y * np.roll(x, -1)) == pytest.approx(1.0)
+
+
+def test_flat_hull_keeps_a_thickness():
+    found = hull(np.array([[0, 0], [1, 0], [0.5, 0]]))
+    assert found.vertices.tolist() == [[0, 0], [1, 0]]
+    assert 0.0 < found.radius <= 1e-6
+
+
+ROOM = Polygon(box(0.0, 0.0, 4.0, 3.0).exterior, [box(2.0, 1.0, 2.5, 1.5).exterior.coords])
+
+
+DISC = Body("disc", 0, (ConvexShape(np.array([[0.1, 0.0]]), 0.2),))
+
+
+BAR = Body("bar", 0, (ConvexShape(np.array([[-0.5, 0.0], [0.5, 0.0]]), 0.1),))
+
+
+PAIR = Body("pair", 0, (ConvexShape(np.array([[0, 0], [1, 0], [1, 1], [0, 1.0]])), *DISC.shapes))
+
+
+@pytest.mark.parametrize(
+    ("body", "pose", "clearance"),
+    [
+        (DISC, PlanarPose(0.9, 1.0, 0.0), 0.8),
+        (DISC, PlanarPose(1.0, 0.6, -np.pi / 2), 0.3),
+        (DISC, PlanarPose(1.5, 1.2, 0.0), 0.2),
+        (DISC, PlanarPose(0.0, 1.2, 0.0), -0.1),
+        (DISC, PlanarPose(-1.1, 1.2, 0.0), -1.2),
+        (DISC, PlanarPose(2.15, 1.25, 0.0), -0.45),
+        (BAR, PlanarPose(1.0, 0.8, np.pi / 2), 0.2),
+        (BAR, PlanarPose(2.25, 0.7, 0.0), 0.2),
+        (BAR, PlanarPose(0.3, 1.0, 0.0), -0.3),
+        (PAIR, PlanarPose(0.05, 1.9, 0.0), -0.05),
+        (PAIR, PlanarPose(0.4, 1.7, 0.0), 0.3),
+        (Body("frame", 0, ()), PlanarPose(-9.0, 0.0, 0.0), np.inf),
+    ],
+)
+def test_clearance_to_the_walls(body, pose, clearance):
+    assert wall_clearance(body, pose, ROOM) == pytest.approx(clearance)
+
+
+@pytest.mark.parametrize(
+    ("first", "second", "pose", "clearance"),
+    [
+        (DISC, DISC, PlanarPose(1.0, 0.0, 0.0), 0.6),
+        (DISC, DISC, PlanarPose(0.2, 0.0, np.pi), -0.4),
+        (DISC, BAR, PlanarPose(0.1, 0.6, 0.0), 0.3),
+        (PAIR, BAR, PlanarPose(2.0, 0.5, 0.0), 0.4),
+        (PAIR, PAIR, PlanarPose(0.5, 0.5, 0.3), -0.2),
+    ],
+)
+def test_clearance_between_bodies(first, second, pose, clearance):
+    assert body_clearance(first, PlanarPose(), second, pose) == pytest.approx(clearance)

@@ -1,7 +1,5 @@
 """Robots from elsewhere: meshes become hulls, what cannot be used is left out or mended, and said."""
 
-from __future__ import annotations
-
 import json
 import re
 from pathlib import Path
@@ -24,9 +22,13 @@ LINK = """<link name="{name}">
   <inertial><mass value="{mass}"/><inertia ixx="{ixx}" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>
   {shapes}
 </link>"""
+
+
 CAST = """<{kind}><geometry>
   <mesh filename="package://maker/meshes/{file}" scale="0.001 0.001 0.001"/>
 </geometry></{kind}>"""
+
+
 ROBOT = """<robot name="maker">
 {links}
 <link name="tool"/>
@@ -83,67 +85,6 @@ def maker(tmp_path_factory):
     path.parent.mkdir()
     path.write_text(ROBOT.format(links="\n".join(links)))
     return path
-
-
-def test_it_becomes_one_folder_that_a_team_can_be_built_of(maker, tmp_path):
-    done = CliRunner().invoke(app, ["robot", str(maker), "--out", str(tmp_path / "maker")])
-    assert done.exit_code == 0, done.output
-    path = write_edited(
-        tmp_path,
-        ("package://coop_drake_models/long_blue.sdf", "maker/maker.urdf"),
-        ("child: robot_0::gripper", "child: robot_0::tool"),
-        ("robot_0: [0.0]", "robot_0: [0.1]"),
-    )
-    path.write_text(path.read_text() + '\nfixed_joints: {robot_0: {"*": 0, arm: null}}\n')
-    tree = read_task(path, None).problem.tree
-    base = next(b for c in tree.components for b in c.bodies if b.name == "robot_0::base")
-    (shape,) = base.shapes
-    outline = Polygon(shape.vertices)
-    disc = Point(0.5 * (outline.bounds[0] + outline.bounds[2]), outline.centroid.y).buffer(0.2485, 64)
-    assert outline.covers(disc)  # The disc, in metres, less what 48 sides leave of it.
-    assert outline.area < np.pi * 0.254**2
-    assert len(shape.vertices) <= 32
-    names = {body.name for component in tree.components for body in component.bodies}
-    assert "robot_0::wheel" not in names  # Its shadow lies within the base's.
-    assert "robot_0::arm" in names
-
-
-@pytest.mark.parametrize("kind", ["urdf", "sdf"])
-def test_the_gripper_frame_and_the_lines_for_a_scenario_make_a_team(maker, tmp_path, kind):
-    done = CliRunner().invoke(
-        app,
-        [
-            "robot",
-            str(model_of(kind, maker, tmp_path)),
-            "--gripper",
-            "arm",
-            "--out",
-            str(tmp_path / "mine"),
-            "--json",
-        ],
-    )
-    assert done.exit_code == 0, done.output
-    lines = yaml.safe_load(json.loads(done.stdout)["scenario_lines"])
-    model, weld = lines["directives"]
-    assert weld == {"add_weld": {"parent": "object::grasp_0", "child": "robot_0::gripper"}}
-    file = Path(model["add_model"]["file"]).relative_to(tmp_path)
-    path = write_edited(
-        tmp_path,
-        ("package://coop_drake_models/long_blue.sdf", str(file)),
-        ("robot_0: [0.0]", f"robot_0: {lines['start']['joints']['robot_0']}"),
-    )
-    path.write_text(path.read_text() + yaml.safe_dump({"fixed_joints": lines.get("fixed_joints", {})}))
-    tree = read_task(path, None).problem.tree
-    base = next(b for c in tree.components for b in c.bodies if b.name == "robot_0::base")
-    corners = base.shapes[0].vertices
-    middle = 0.5 * (corners.min(axis=0) + corners.max(axis=0))
-    assert middle == pytest.approx([0.3, 0.0], abs=1e-3)  # Outside, seen from the grasp.
-
-
-def test_a_gripper_at_a_link_that_is_not_there_is_refused(maker, tmp_path):
-    done = CliRunner().invoke(app, ["robot", str(maker), "--gripper", "hand", "--out", str(tmp_path)])
-    assert done.exit_code == 2
-    assert "a link of the model, one of base, wheel, mast, arm" in " ".join(done.output.split())
 
 
 def test_what_was_changed_is_said(maker):
@@ -204,17 +145,6 @@ def test_what_cannot_be_read_is_refused(maker, tmp_path):
         import_robot(tmp_path / "mesh.urdf", {"maker": maker.parents[1]})
 
 
-def test_the_command_never_overwrites_and_refuses_wrong_words(maker, tmp_path):
-    call = ["robot", str(maker), "--out", str(tmp_path)]
-    (tmp_path / "maker.urdf").write_text("mine")
-    done = CliRunner().invoke(app, call)
-    assert done.exit_code == 2
-    assert (tmp_path / "maker.urdf").read_text() == "mine"
-    assert CliRunner().invoke(app, [*call, "--force"]).exit_code == 0
-    assert CliRunner().invoke(app, [*call, "--force", "--fix", "arm"]).exit_code == 2
-    assert CliRunner().invoke(app, [*call, "--force", "--fix", "arm=up"]).exit_code == 2
-
-
 @pytest.mark.parametrize("ending", ["urdf", "sdf"])
 @pytest.mark.parametrize(
     ("kind", "limits", "note"),
@@ -248,3 +178,66 @@ def test_a_joint_with_one_limit_has_to_be_fixed(tmp_path):
     path.write_text(URDF.format(kind="revolute", limits='upper="2"'))
     (joint,) = survey_joints(path)
     assert (joint.limits, joint.verdict) == ("-inf to 2", "fix it")
+
+
+def prepared(model, folder, *options):
+    """The outcome of `coop-drake robot`."""
+    return CliRunner().invoke(app, ["robot", str(model), "--out", str(folder), *options])
+
+
+def base_in(path):
+    """Collision shapes of the first robot's base, and names of all bodies, in the question of a scenario."""
+    bodies = {body.name: body for c in read_task(path, None).problem.tree.components for body in c.bodies}
+    return bodies["robot_0::base"].shapes, bodies.keys()
+
+
+def test_it_becomes_one_folder_that_a_team_can_be_built_of(maker, tmp_path):
+    done = prepared(maker, tmp_path / "maker")
+    assert done.exit_code == 0, done.output
+    path = write_edited(
+        tmp_path,
+        ("package://coop_drake_models/long_blue.sdf", "maker/maker.urdf"),
+        ("child: robot_0::gripper", "child: robot_0::tool"),
+        ("robot_0: [0.0]", "robot_0: [0.1]"),
+    )
+    path.write_text(path.read_text() + '\nfixed_joints: {robot_0: {"*": 0, arm: null}}\n')
+    (shape,), names = base_in(path)
+    outline = Polygon(shape.vertices)
+    disc = Point(0.5 * (outline.bounds[0] + outline.bounds[2]), outline.centroid.y).buffer(0.2485, 64)
+    assert outline.covers(disc)  # The disc, in metres, less what 48 sides leave of it.
+    assert outline.area < np.pi * 0.254**2
+    assert len(shape.vertices) <= 32
+    assert "robot_0::wheel" not in names  # Its shadow lies within the base's.
+    assert "robot_0::arm" in names
+
+
+@pytest.mark.parametrize("kind", ["urdf", "sdf"])
+def test_the_gripper_frame_and_the_lines_for_a_scenario_make_a_team(maker, tmp_path, kind):
+    done = prepared(model_of(kind, maker, tmp_path), tmp_path / "mine", "--gripper", "arm", "--json")
+    assert done.exit_code == 0, done.output
+    lines = yaml.safe_load(json.loads(done.stdout)["scenario_lines"])
+    model, weld = lines["directives"]
+    assert weld == {"add_weld": {"parent": "object::grasp_0", "child": "robot_0::gripper"}}
+    file = Path(model["add_model"]["file"]).relative_to(tmp_path)
+    path = write_edited(
+        tmp_path,
+        ("package://coop_drake_models/long_blue.sdf", str(file)),
+        ("robot_0: [0.0]", f"robot_0: {lines['start']['joints']['robot_0']}"),
+    )
+    path.write_text(path.read_text() + yaml.safe_dump({"fixed_joints": lines.get("fixed_joints", {})}))
+    corners = base_in(path)[0][0].vertices
+    middle = 0.5 * (corners.min(axis=0) + corners.max(axis=0))
+    assert middle == pytest.approx([0.3, 0.0], abs=1e-3)  # Outside, seen from the grasp.
+
+
+def test_the_command_never_overwrites_and_refuses_wrong_words(maker, tmp_path):
+    mine = tmp_path / "maker.urdf"
+    mine.write_text("mine")
+    assert prepared(maker, tmp_path).exit_code == 2
+    assert mine.read_text() == "mine"
+    assert prepared(maker, tmp_path, "--force").exit_code == 0
+    for wrong in ("arm", "arm=up"):
+        assert prepared(maker, tmp_path, "--force", "--fix", wrong).exit_code == 2
+    done = prepared(maker, tmp_path, "--force", "--gripper", "hand")
+    assert done.exit_code == 2
+    assert "a link of the model, one of base, wheel, mast, arm" in " ".join(done.output.split())

@@ -28,6 +28,8 @@ U_SHAPE = [
     (-0.1, 0.3),
     (-0.5, 0.3),
 ]
+
+
 L_SHAPE = [(0, 0), (0.6, 0), (0.6, 0.2), (0.2, 0.2), (0.2, 0.5), (0, 0.5)]
 
 
@@ -112,48 +114,6 @@ def test_team_carries_a_non_convex_object(outline, tmp_path):
     assert team.robots[1].X_LE.x == pytest.approx(-0.5)
 
 
-def called(folder, *arguments):
-    return CliRunner().invoke(app, ["new", "object", *arguments, "--out", str(folder)])
-
-
-def test_command_line_writes_the_same_files_and_replaces_none(tmp_path):
-    corners = ", ".join(f"{x} {y}" for x, y in U_SHAPE)
-    arguments = [
-        "u",
-        "--corners",
-        corners,
-        "--mass",
-        "2",
-        "--height",
-        "0.3",
-        "--grasps",
-        "-0.5 0 3.14, 0.5 0 0",
-    ]
-    done = called(tmp_path / "made", *arguments)
-    assert done.exit_code == 0, done.output
-    assert "- add_weld: {parent: object::grasp_1, child: robot_1::gripper}" in done.output
-    expected = polygon_body_files(U_SHAPE, 2.0, "u", 0.3, grasps=[(-0.5, 0, 3.14), (0.5, 0, 0)])
-    assert {file.name: file.read_text() for file in (tmp_path / "made").iterdir()} == expected
-    assert called(tmp_path / "made", *arguments).exit_code == 2
-
-
-@pytest.mark.parametrize(
-    ("arguments", "complaint"),
-    [
-        (["x", "--corners", "0 0, 1 0", "--mass", "1"], "three or more corners"),
-        (["x", "--corners", "0 0, 1 0, 1", "--mass", "1"], "should be 2 numbers"),
-        (["x", "--corners", "0 0, 1 0, one", "--mass", "1"], "could not convert"),
-        (["x", "--corners", "0 0, 1 0, 1 1", "--mass", "0"], "mass must be a positive number, got 0.0"),
-        (["../x", "--corners", "0 0, 1 0, 1 1", "--mass", "1"], "no name of letters"),
-    ],
-)
-def test_command_line_says_what_is_wrong(arguments, complaint, tmp_path):
-    done = called(tmp_path, *arguments)
-    assert done.exit_code == 2
-    assert complaint in " ".join(done.output.replace("│", " ").split())
-    assert list(tmp_path.iterdir()) == []
-
-
 @pytest.mark.parametrize(
     ("outline", "changes", "complaint"),
     [
@@ -168,3 +128,36 @@ def test_command_line_says_what_is_wrong(arguments, complaint, tmp_path):
 def test_impossible_bodies_are_refused(outline, changes, complaint):
     with pytest.raises(GeometryError, match=re.escape(complaint)):
         polygon_body_files(outline, **{"mass": 1.0, "name": "x", **changes})
+
+
+def called(folder, name="x", corners="0 0, 1 0, 1 1", mass="1", *more):
+    arguments = [name, "--corners", corners, "--mass", mass, *more, "--out", str(folder)]
+    return CliRunner().invoke(app, ["new", "object", *arguments])
+
+
+def test_command_line_writes_the_same_files_and_replaces_none(tmp_path):
+    corners, grasps = ", ".join(f"{x} {y}" for x, y in U_SHAPE), "-0.5 0 3.14, 0.5 0 0"
+    arguments = tmp_path / "made", "u", corners, "2", "--height", "0.3", "--grasps", grasps
+    done = called(*arguments)
+    assert done.exit_code == 0, done.output
+    assert "- add_weld: {parent: object::grasp_1, child: robot_1::gripper}" in done.output
+    expected = polygon_body_files(U_SHAPE, 2.0, "u", 0.3, grasps=[(-0.5, 0, 3.14), (0.5, 0, 0)])
+    assert {file.name: file.read_text() for file in (tmp_path / "made").iterdir()} == expected
+    assert called(*arguments).exit_code == 2
+
+
+@pytest.mark.parametrize(
+    ("changes", "complaint"),
+    [
+        ({"corners": "0 0, 1 0"}, "three or more corners"),
+        ({"corners": "0 0, 1 0, 1"}, "should be 2 numbers"),
+        ({"corners": "0 0, 1 0, one"}, "could not convert"),
+        ({"mass": "0"}, "mass must be a positive number, got 0.0"),
+        ({"name": "../x"}, "no name of letters"),
+    ],
+)
+def test_command_line_says_what_is_wrong(changes, complaint, tmp_path):
+    done = called(tmp_path, **changes)
+    assert done.exit_code == 2
+    assert complaint in " ".join(done.output.replace("│", " ").split())
+    assert list(tmp_path.iterdir()) == []

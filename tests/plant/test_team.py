@@ -1,52 +1,41 @@
-"""The team's plant: one tree at the object, exact grasps, torques in q's order."""
+"""The team's plant, each robot's own model of itself, and the compiled chains and tree, against Drake."""
 
 import numpy as np
 import pytest
+from pydrake.multibody.math import SpatialForce
+from pydrake.multibody.plant import ExternallyAppliedSpatialForce
+from pydrake.systems.framework import DiagramBuilder
 
-from coop_drake.plant import base_poses, set_configuration
+from coop_drake.laws.robot_dynamics import DAMPING, estimate_object, motion_room, read_robot, robot_effort
+from coop_drake.laws.team_dynamics import (
+    BRAKING_TIME,
+    STICKING_TIME,
+    solve_tree,
+    stick,
+    sticking_room,
+    team_accelerations,
+    team_work,
+)
+from coop_drake.plant import (
+    base_chain,
+    base_poses,
+    build_team_plant,
+    read_component_tree,
+    read_team_tree,
+    robot_chain,
+    set_configuration,
+)
 from coop_drake.scenario import load_scenario
+from coop_drake.systems import RobotEffort
 from coop_drake.tree.pose import PlanarPose
 from tests.support.cases import GRASPS
 from tests.support.configuration import get_configuration, get_rates
 from tests.support.edited_scenario import MODELS, exchanged, shipped, team_of, write_edited, write_with_robot
+from tests.support.ring_team import PRISMATIC, REVOLUTE, ring_team
+from tests.support.robot_dynamics import robot_dynamics
+from tests.support.robot_matrices import robot_acceleration
 from tests.support.robot_models import Arm
-
-
-def some_state(team, seed=5):
-    rng = np.random.default_rng(seed)
-    size = 3 + len(team.joints)
-    return rng.uniform(-0.2, 0.2, size), rng.uniform(-1.0, 1.0, size)
-
-
-def test_coordinates_are_the_object_and_the_joints_and_nothing_else(team):
-    assert team.plant.num_positions() == 3 + len(team.joints)
-    assert sorted(team.position_index) == list(range(team.plant.num_positions()))
-    assert sorted(team.velocity_index) == list(range(team.plant.num_velocities()))
-    assert team.plant.time_step() == 0.0
-    assert team.plant.gravity_field().gravity_vector() == pytest.approx([0.0, 0.0, 0.0])
-
-
-def test_configuration_and_rates_come_back_as_they_were_set(team):
-    context = team.plant.CreateDefaultContext()
-    z, z_rate = some_state(team)
-    set_configuration(team, context, z, z_rate)
-    assert get_configuration(team, context) == pytest.approx(z)
-    assert get_rates(team, context) == pytest.approx(z_rate)
-    set_configuration(team, context, z)
-    assert get_rates(team, context) == pytest.approx(np.zeros(len(z)))
-
-
-def test_object_pose_in_the_plant_is_the_configuration(team):
-    context = team.plant.CreateDefaultContext()
-    set_configuration(team, context, np.array([1.0, 2.0, 0.7, *np.zeros(len(team.joints))]))
-    X_WL = team.object_frame.CalcPoseInWorld(context)
-    assert X_WL.translation() == pytest.approx([1.0, 2.0, 0.0])
-    assert X_WL.rotation().ToRollPitchYaw().vector() == pytest.approx([0.0, 0.0, 0.7])
-
-
-def test_torques_enter_in_the_order_of_q(team):
-    actuation = team.plant.MakeActuationMatrix()[team.velocity_index]
-    assert actuation == pytest.approx(np.eye(3 + len(team.joints))[:, 3:])
+from tests.support.system_checks import evaluate
 
 
 def test_grasps_are_where_the_object_offers_them():
@@ -136,16 +125,294 @@ def test_robot_of_two_models_is_one_robot(tmp_path):
     assert team.robots[0].gripper_frame.name() == "tip"
 
 
-def test_torques_saturate_at_the_effort_that_a_file_states(tmp_path):
-    arm = Arm(
-        joints=(("revolute", "0 0 1", "<limit><lower>-1</lower><upper>1</upper><effort>3</effort></limit>"),)
+def test_the_plant_has_the_coordinates_of_the_object_and_the_joints_and_torques_in_their_order(team):
+    size = 3 + len(team.joints)
+    assert team.plant.num_positions() == size
+    assert sorted(team.position_index) == sorted(team.velocity_index) == list(range(size))
+    assert team.plant.time_step() == 0.0
+    assert team.plant.gravity_field().gravity_vector() == pytest.approx([0.0, 0.0, 0.0])
+    actuation = team.plant.MakeActuationMatrix()[team.velocity_index]
+    assert actuation == pytest.approx(np.eye(size)[:, 3:])
+    context, generator = team.plant.CreateDefaultContext(), np.random.default_rng(5)
+    z, z_rate = generator.uniform(-0.2, 0.2, size), generator.uniform(-1.0, 1.0, size)
+    set_configuration(team, context, z, z_rate)
+    assert get_configuration(team, context) == pytest.approx(z)
+    assert get_rates(team, context) == pytest.approx(z_rate)
+    X_WL = team.object_frame.CalcPoseInWorld(context)
+    assert X_WL.translation() == pytest.approx([*z[:2], 0.0])
+    assert X_WL.rotation().ToRollPitchYaw().vector() == pytest.approx([0.0, 0.0, z[2]])
+    set_configuration(team, context, z)
+    assert get_rates(team, context) == pytest.approx(np.zeros(size))
+
+
+PLANAR = [3, 4, 2]
+
+
+def moving(team, context, seed=2):
+    """A state of the team within its joints' limits; z and its rates."""
+    rng = np.random.default_rng(seed)
+    joints = [rng.uniform(j.position_lower_limits()[0], j.position_upper_limits()[0]) for j in team.joints]
+    z, z_rate = np.array([*rng.uniform(-2.0, 2.0, 3), *joints]), rng.uniform(-1.0, 1.0, 3 + len(joints))
+    set_configuration(team, context, z, z_rate)
+    return z, z_rate
+
+
+def own_state(team, robot, context, z, z_rate):
+    """(z_k, z_k') of one robot as the team's plant has them."""
+    base_rate = robot.base_body.EvalSpatialVelocityInWorld(context).get_coeffs()[PLANAR]
+    joints = slice(3 + robot.q_slice.start, 3 + robot.q_slice.stop)
+    pose = base_poses(team, context)[robot.index]
+    return np.concatenate([pose, z[joints]]), np.concatenate([base_rate, z_rate[joints]])
+
+
+def test_kinetic_energies_of_object_and_robots_add_up_to_the_team_s(scenario, team):
+    context = team.plant.CreateDefaultContext()
+    z, z_rate = moving(team, context)
+    inertia = team.object_inertia
+    arm = np.array([[np.cos(z[2]), -np.sin(z[2])], [np.sin(z[2]), np.cos(z[2])]]) @ inertia.p_LLcm
+    speed = z_rate[:2] + z_rate[2] * np.array([-arm[1], arm[0]])
+    energy = 0.5 * inertia.mass * speed @ speed + 0.5 * inertia.inertia_about_com * z_rate[2] ** 2
+    for robot in team.robots:
+        own = robot_dynamics(scenario, robot.index)
+        own.set_state(*own_state(team, robot, context, z, z_rate))
+        rate = own_state(team, robot, context, z, z_rate)[1]
+        energy += 0.5 * rate @ own.mass_matrix() @ rate
+    assert energy == pytest.approx(team.plant.CalcKineticEnergy(context), rel=1e-9)
+
+
+def test_grasp_moves_in_both_plants_alike(scenario, team):
+    context = team.plant.CreateDefaultContext()
+    z, z_rate = moving(team, context)
+    for robot in team.robots:
+        own = robot_dynamics(scenario, robot.index)
+        own.set_state(*(state := own_state(team, robot, context, z, z_rate)))
+        X_WE = robot.gripper_frame.CalcPoseInWorld(context)
+        assert own.grasp_pose()[:2] == pytest.approx(X_WE.translation()[:2], abs=1e-7)
+        twist = robot.gripper_frame.CalcSpatialVelocityInWorld(context).get_coeffs()[PLANAR]
+        assert own.grasp_jacobian() @ state[1] == pytest.approx(twist, abs=1e-7)
+
+
+def test_mass_matrix_of_a_shipped_robot_by_hand():
+    """Straight arm: 8 kg; base, link 1 and link 2 at 0, 0.175 and 0.56 m from the base."""
+    own = robot_dynamics(shipped("base"), 0)
+    own.set_state(np.zeros(4), np.zeros(4))
+    matrix = own.mass_matrix()
+    link_1, link_2 = (0.35**2 + 0.1**2) / 12.0, (0.42**2 + 0.1**2) / 12.0
+    about_base = 0.5 * 6.0 * 0.25**2 + link_1 + 0.175**2 + link_2 + 0.56**2
+    assert matrix[:2, :2] == pytest.approx(8.0 * np.eye(2))
+    assert matrix[1, 2] == pytest.approx(0.175 + 0.56)
+    assert matrix[2, 2] == pytest.approx(about_base, rel=1e-4)
+    assert matrix[3, 3] == pytest.approx(link_2 + 0.21**2, rel=1e-4)
+
+
+def applied(team, wrenches):
+    """Wrenches on the bases and on the object as Drake takes them."""
+    forces = []
+    origins = [(robot.base_body, np.zeros(3)) for robot in team.robots]
+    origins.append((team.object_body, team.object_frame.GetFixedPoseInBodyFrame().translation()))
+    for (body, place), (fx, fy, torque) in zip(origins, wrenches, strict=True):
+        force = ExternallyAppliedSpatialForce()
+        force.body_index, force.p_BoBq_B = body.index(), place
+        force.F_Bq_W = SpatialForce(tau=[0.0, 0.0, torque], f=[fx, fy, 0.0])
+        forces.append(force)
+    return forces
+
+
+def test_effort_is_what_moves_the_robot_and_what_its_hand_gives_away(scenario):
+    """M z'' + C z' + J^T tau_e equals the base wrench and torques put in, with tau_e read from the weld."""
+    team, builder = team_of(scenario)
+    diagram = builder.Build()
+    root = diagram.CreateDefaultContext()
+    plant, context = team.plant, team.plant.GetMyMutableContextFromRoot(root)
+    z, z_rate = moving(team, context)
+    rng = np.random.default_rng(4)
+    wrenches = rng.uniform(-5.0, 5.0, (len(team.robots), 3))
+    torques = rng.uniform(-2.0, 2.0, len(team.joints))
+    plant.get_actuation_input_port().FixValue(context, torques)
+    forces = applied(team, [*wrenches, np.zeros(3)])
+    plant.get_applied_spatial_force_input_port().FixValue(context, forces)
+    acceleration = plant.get_generalized_acceleration_output_port().Eval(context)
+    spatial = plant.get_body_spatial_accelerations_output_port().Eval(context)
+    on_object = team.grasps.wrenches(context)
+    for robot in team.robots:
+        own = robot_dynamics(scenario, robot.index)
+        own.set_state(*own_state(team, robot, context, z, z_rate))
+        base = spatial[int(robot.base_body.index())].get_coeffs()[PLANAR]
+        joints = acceleration[[joint.velocity_start() for joint in robot.joints]]
+        reaction = own.grasp_jacobian().T @ on_object[robot.index]
+        effort = own.inertial_effort(np.concatenate([base, joints])) + reaction
+        given = np.concatenate([wrenches[robot.index], torques[robot.q_slice]])
+        assert effort == pytest.approx(given, abs=1e-5)
+
+
+CHAINS = [[REVOLUTE, PRISMATIC, REVOLUTE], [PRISMATIC], [REVOLUTE, REVOLUTE]]
+
+
+@pytest.mark.parametrize("k", range(len(CHAINS)))
+def test_an_end_effector_moves_and_is_moved_as_in_drake(ring, k):
+    robot, n = robot_dynamics(ring, k), len(CHAINS[k])
+    robot.scale_masses(1.3)
+    for joint in robot.joints:
+        joint.SetDampingVector(robot.context, [0.7])
+    robot.plant.get_joint_actuator(robot.plant.GetJointActuatorIndices()[0]).SetRotorInertia(
+        robot.context, 0.4
     )
-    team, builder = team_of(load_scenario(write_with_robot(tmp_path, arm.text())))
-    root = builder.Build().CreateDefaultContext()
-    context = team.plant.GetMyMutableContextFromRoot(root)
-    port = team.plant.get_generalized_acceleration_output_port()
-    team.plant.get_actuation_input_port().FixValue(context, [3.0, 0.0])
-    at_limit = port.Eval(context).copy()
-    team.plant.get_actuation_input_port().FixValue(context, [10.0, 0.0])
-    assert port.Eval(context) == pytest.approx(at_limit)
-    assert np.abs(at_limit).max() > 1.0
+    chain, generator = robot_chain(robot), np.random.default_rng(k)
+    for state, hand, joints in zip(
+        generator.normal(size=(20, 2 * (3 + n))),
+        generator.normal(size=(20, 6)),
+        generator.normal(size=(20, n)),
+        strict=True,
+    ):
+        robot.set_state(*np.split(state, 2))
+        jacobian = robot.grasp_jacobian()
+        seen, motion = np.empty(6), motion_room(chain)
+        estimate_object(chain, np.zeros(2), motion, state, np.zeros(3), seen)
+        np.testing.assert_allclose(seen[3:], jacobian @ state[3 + n :], atol=1e-14)
+        acceleration = robot_acceleration(
+            hand[:3], joints, jacobian=jacobian, jacobian_rate_term=robot.grasp_bias()
+        )
+        expected = robot.inertial_effort(acceleration) + hand[3:] @ jacobian
+        effort = np.empty(3 + n)
+        robot_effort(chain, motion, state, hand, np.array([9.0, *joints]), effort)
+        np.testing.assert_allclose(effort, expected, atol=1e-13 * np.abs(expected).max())
+
+
+def test_a_base_is_where_the_teams_plant_has_it(ring):
+    team = build_team_plant(ring, DiagramBuilder())
+    context, generator = team.plant.CreateDefaultContext(), np.random.default_rng(1)
+    for robot in team.robots:
+        way, n = base_chain(team, robot), len(robot.joints)
+        for state in generator.normal(size=(20, team.plant.num_multibody_states())):
+            team.plant.SetPositionsAndVelocities(context, state)
+            X_WB = robot.base_body.EvalPoseInWorld(context).GetAsMatrix34()
+            V_WB = robot.base_body.EvalSpatialVelocityInWorld(context).get_coeffs()
+            found = np.empty(2 * (3 + n))
+            read_robot(way.chain, way.yaw, way.joints, motion_room(way.chain), state, found)
+            expected = [X_WB[0, 3], X_WB[1, 3], np.arctan2(X_WB[1, 0], X_WB[0, 0])]
+            np.testing.assert_allclose(found[:3], expected, atol=1e-14)
+            np.testing.assert_allclose(found[3 + n : 6 + n], V_WB[[3, 4, 2]], atol=1e-14)
+
+
+def test_springs_of_a_model_are_held(tmp_path):
+    dynamics = (
+        "<damping>0.3</damping><spring_stiffness>2</spring_stiffness><spring_reference>0.4</spring_reference>"
+    )
+    more = f"<limit><lower>-1</lower><upper>1</upper></limit><dynamics>{dynamics}</dynamics>"
+    robot = robot_dynamics(ring_team(tmp_path, [[("revolute", "0 0 1", more)], [REVOLUTE]]), 0)
+    assert robot.has_springs
+    state, hand, joints = np.linspace(0.1, 0.8, 8), np.linspace(-1.0, 1.0, 6), np.array([0.5])
+    inputs = {"robot_state": state, "hand_command": hand, "axis_acceleration": [9.0, *joints]}
+    effort = evaluate(RobotEffort(robot), inputs, "robot_effort")
+    robot.set_state(*np.split(state, 2))
+    jacobian = robot.grasp_jacobian()
+    z = robot_acceleration(hand[:3], joints, jacobian=jacobian, jacobian_rate_term=robot.grasp_bias())
+    expected = robot.inertial_effort(z) + hand[3:] @ jacobian
+    np.testing.assert_allclose(effort, expected, atol=1e-13)
+    without = np.empty(4)
+    chain = robot_chain(robot)
+    robot_effort(chain, motion_room(chain), state, hand, np.array([9.0, *joints]), without)
+    assert effort[3] - without[3] == pytest.approx(2.0 * (state[3] - 0.4))
+
+
+@pytest.fixture(scope="module")
+def ring(tmp_path_factory):
+    return ring_team(tmp_path_factory.mktemp("ring"), CHAINS)
+
+
+ARMS = [[REVOLUTE, PRISMATIC, REVOLUTE], [PRISMATIC], [REVOLUTE, REVOLUTE], []]
+
+
+GRAVITY = 0.3
+
+
+def test_the_team_accelerates_as_in_drake(tmp_path):
+    builder, generator = DiagramBuilder(), np.random.default_rng(1)
+    team = build_team_plant(ring_team(tmp_path, ARMS), builder)
+    plant, diagram = team.plant, builder.Build()
+    plant.mutable_gravity_field().set_gravity_vector([GRAVITY, 0.0, 0.0])
+    tree = read_team_tree(team, read_component_tree(team))
+    context = plant.GetMyMutableContextFromRoot(diagram.CreateDefaultContext())
+    tree.tree[1:, DAMPING] = 0.7
+    for joint in team.joints:
+        joint.SetDampingVector(context, [0.7])
+    size, work = plant.num_velocities(), team_work(tree.tree)
+    for _ in range(20):
+        state, wrenches = generator.normal(size=2 * size), generator.normal(size=(len(ARMS) + 1, 3))
+        state[team.position_index[3:]] *= 0.1  # nothing touches, and no joint is at its limit
+        torques, efforts = generator.normal(size=len(team.joints)), np.zeros(size)
+        efforts[team.velocity_index[3:]] = torques
+        plant.SetPositionsAndVelocities(context, state)
+        plant.get_actuation_input_port().FixValue(context, torques)
+        plant.get_applied_spatial_force_input_port().FixValue(context, applied(team, wrenches))
+        expected = plant.get_generalized_acceleration_output_port().Eval(context)
+        found = np.empty(size)
+        forces = tree.bases, tree.places, wrenches, efforts, GRAVITY
+        team_accelerations(tree.tree, *forces, state, work, found)
+        np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-9)
+
+
+@pytest.mark.parametrize("friction", [(0.0, 0.0), (2.0, 0.3), (20.0, 0.0)])
+@pytest.mark.parametrize("blocked", [[], [0], [1, 2], [0, 1, 2, 3]])
+def test_what_sticks_in_drake_sticks_whatever_else_acts(tmp_path, blocked, friction):
+    """Bases with blocked wheels are braked, joints as far as their friction suffices.
+
+    Also where so many bases are blocked that the floor's wrenches are not unique.
+    """
+    builder, generator = DiagramBuilder(), np.random.default_rng(2)
+    team = build_team_plant(ring_team(tmp_path, ARMS), builder)
+    plant, diagram = team.plant, builder.Build()
+    tree = read_team_tree(team, read_component_tree(team))
+    context = plant.GetMyMutableContextFromRoot(diagram.CreateDefaultContext())
+    size, work, room = plant.num_velocities(), team_work(tree.tree), sticking_room(len(tree.tree), len(ARMS))
+    flags, joints = np.zeros(len(ARMS)), team.velocity_index[3:]
+    loose = [len(blocked) < 2 or k not in blocked for k, arm in enumerate(ARMS) for _ in arm]
+    kinds = set()
+    flags[blocked] = 1.0
+    for draw in range(10):
+        state, wrenches = generator.normal(size=2 * size), 30.0 * generator.normal(size=(len(ARMS) + 1, 3))
+        state[team.position_index[3:]] *= 0.1
+        # Where all are blocked, no motion of the team brakes all of them alike while it turns.
+        state[size:] *= 0.0 if len(blocked) == len(ARMS) or draw % 2 else 1.0
+        torques, efforts = 3.0 * generator.normal(size=len(team.joints)), np.zeros(size)
+        efforts[joints] = torques
+        found, asked = np.empty(size), wrenches.copy()
+        forces = tree.bases, tree.places, flags, np.array(friction), efforts, 0.0
+        stick(tree.tree, *forces, state, work, room, found, wrenches)
+        free = [k for k in range(len(ARMS) + 1) if k not in blocked]
+        np.testing.assert_array_equal(wrenches[free], asked[free])
+        plant.SetPositionsAndVelocities(context, state)
+        plant.get_actuation_input_port().FixValue(context, efforts[joints])
+        plant.get_applied_spatial_force_input_port().FixValue(context, applied(team, wrenches))
+        accelerated = plant.get_generalized_acceleration_output_port().Eval(context)
+        np.testing.assert_allclose(found, accelerated, rtol=1e-9, atol=1e-7)
+        for robot in (team.robots[k] for k in blocked):
+            moving = robot.base_body.EvalSpatialVelocityInWorld(context)
+            braked = robot.base_body.EvalSpatialAccelerationInWorld(context)
+            expected = -np.array([*moving.translational()[:2], moving.rotational()[2]]) / BRAKING_TIME
+            seen = [*braked.translational()[:2], braked.rotational()[2]]
+            np.testing.assert_allclose(seen, expected, rtol=1e-6, atol=1e-6)
+        rates = state[size + joints]
+        dry = efforts[joints] - torques + friction[1] * rates
+        assert (np.abs(dry) <= (1.0 + 1e-8) * friction[0] + 1e-12).all()
+        beyond = accelerated[joints] + rates / STICKING_TIME
+        for force, rate, fast in zip(dry[loose], rates[loose], beyond[loose], strict=True):
+            kind = "sticks" if abs(fast) < 1e-6 else "slides"
+            if kind == "slides":
+                assert force == pytest.approx(-np.sign(fast) * friction[0])
+            kinds.add((kind, rate == 0.0))
+    assert len(kinds) == (4 if friction[0] else 2) * any(loose), kinds
+
+
+@pytest.mark.parametrize("parents", [[-1], [-1, 0], [-1, 0, 1, 2, 3, 2, 5], [-1, 0, 0, 1, 1, 3]])
+def test_positive_definite_systems_of_trees_are_solved(parents):
+    generator, size = np.random.default_rng(len(parents)), len(parents)
+    lower, right = np.diag(generator.uniform(0.5, 2.0, size)), generator.normal(size=size)
+    for k in range(size):
+        i = parents[k]
+        while i >= 0:
+            lower[k, i], i = generator.normal(), parents[i]
+    matrix, solution = lower.T @ lower, right.copy()
+    read = np.where(np.tril(matrix) == 0.0, np.nan, np.tril(matrix))  # What is zero is not read.
+    solve_tree(np.array(parents), read, solution)
+    np.testing.assert_allclose(matrix @ solution, right, atol=1e-9)
