@@ -1,14 +1,16 @@
+"""The loop of named blocks: what crosses between robots, where it starts, and what acts on the plant."""
+
 import numpy as np
 import pytest
-from pydrake.systems.analysis import Simulator
 
-from coop_drake.diagram import TELEMETRY, build_closed_loop
+from coop_drake.diagram import TELEMETRY, build_closed_loop, build_station
 from coop_drake.errors import PlanError
 from coop_drake.plant import set_configuration
 from tests.support.configuration import get_configuration, get_rates
 from tests.support.small_loop import TEAMS, small_loop, small_maps, small_problem
 from tests.support.small_plan import small_plan
-from tests.support.system_checks import port_sizes
+from tests.support.small_scenario import small_scenario
+from tests.support.system_checks import context_with, port_sizes
 
 
 @pytest.fixture(scope="module", params=TEAMS)
@@ -47,13 +49,6 @@ def test_between_robots_only_ready_reports_cross(loop):
     assert loop.cell_planner.GetOutputPort("current_cell").size() == 2
 
 
-def test_no_robot_is_told_anothers_state(loop):
-    heard = [(source, sink) for source, (sink, entry) in links(loop) if source[1].endswith("_state")]
-    for (_, port), sink in heard:
-        assert port.split("_")[1] == sink.split("_")[1]
-    assert len(heard) == len(loop.controllers)
-
-
 def outputs_of(controller, context):
     """Everything that leaves a controller, its telemetry too, bit by bit."""
     own = controller.GetMyContextFromRoot(context)
@@ -80,20 +75,6 @@ def test_what_one_robot_does_changes_nothing_that_another_computes(loop):
                 assert after[k]["robot_effort"] != before[k]["robot_effort"]
             else:
                 assert after[k] == before[k], controller.get_name()
-
-
-def test_of_a_report_only_its_cell_and_its_sign_count():
-    """A margin's size tells the cell planner nothing: one bit and an index are what crosses."""
-    planner = small_loop("base").cell_planner
-    outcomes = set()
-    for margin in (0.0, 1e-9, 0.3, 1e6, np.inf):
-        context = planner.CreateDefaultContext()
-        for k in range(2):
-            planner.GetInputPort(f"robot_{k}_ready").FixValue(context, [0.0, margin])
-        simulator = Simulator(planner, context)
-        simulator.AdvanceTo(0.01)
-        outcomes.add(tuple(simulator.get_context().get_discrete_state_vector().value()))
-    assert outcomes == {(1.0, 0.0)}
 
 
 def test_nothing_enters_or_leaves_the_whole(loop):
@@ -196,3 +177,59 @@ def test_a_plan_for_another_team_is_refused():
         build_closed_loop(scenario, other, small_maps())
     with pytest.raises(PlanError, match="a plan of 3 cells needs as many maps, not 2"):
         build_closed_loop(scenario, plan, small_maps()[:2])
+
+
+@pytest.fixture(scope="module", params=["base", "elbow", "three"])
+def station(request):
+    return build_station(small_scenario(request.param))
+
+
+def efforts_of(team):
+    generator = np.random.default_rng(7)
+    return {
+        f"robot_{robot.index}_effort": generator.normal(size=3 + len(robot.joints)) for robot in team.robots
+    }
+
+
+@pytest.fixture
+def driven(station):
+    """Efforts, and the plant's context in which they act on a team that stands askew."""
+    team, efforts = station.team, efforts_of(station.team)
+    root = context_with(station.diagram, efforts)
+    z = np.array([3.0, 3.0, 0.4, *np.linspace(-0.8, 0.7, len(team.joints))])
+    set_configuration(team, team.plant.GetMyMutableContextFromRoot(root), z)
+    return efforts, root, team.plant.GetMyContextFromRoot(root)
+
+
+def test_base_wrenches_act_on_bases_in_the_axes_of_the_world(station, driven):
+    efforts, _root, context = driven
+    forces = station.team.plant.get_applied_spatial_force_input_port().Eval(context)
+    assert {force.body_index for force in forces} == {
+        robot.base_body.index() for robot in station.team.robots
+    }
+    for robot, effort in zip(station.team.robots, efforts.values(), strict=True):
+        on_base = [force for force in forces if force.body_index == robot.base_body.index()]
+        for force in on_base:
+            np.testing.assert_array_equal(force.p_BoBq_B, np.zeros(3))
+        pushed = sum(force.F_Bq_W.translational() for force in on_base)
+        turned = sum(force.F_Bq_W.rotational() for force in on_base)
+        np.testing.assert_array_equal(pushed[:2], effort[:2])
+        np.testing.assert_array_equal(turned, [0.0, 0.0, effort[2]])
+        assert abs(pushed[2]) <= 1e-15 * np.abs(effort[:2]).sum()  # the floor holds what a right angle rounds
+
+
+def test_joint_torques_act_on_joints(station, driven):
+    efforts, _root, context = driven
+    np.testing.assert_array_equal(
+        station.team.plant.get_actuation_input_port().Eval(context),
+        np.concatenate([effort[3:] for effort in efforts.values()]),
+    )
+
+
+def test_actuation_needs_every_robots_effort(station):
+    efforts, plant = efforts_of(station.team), station.team.plant
+    del efforts["robot_1_effort"]
+    context = plant.GetMyContextFromRoot(context_with(station.diagram, efforts))
+    for port in (plant.get_applied_spatial_force_input_port(), plant.get_actuation_input_port()):
+        with pytest.raises(RuntimeError, match="robot_1_effort"):
+            port.Eval(context)

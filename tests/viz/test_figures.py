@@ -1,6 +1,4 @@
-"""The figures of a run: which files, and what is drawn in them."""
-
-from __future__ import annotations
+"""The figures of a run and of a search for gains: which files, and what is drawn in them."""
 
 from dataclasses import replace
 
@@ -13,6 +11,8 @@ from PIL import Image
 from coop_drake.answers.speeds import base_speeds
 from coop_drake.drawing.canvas import house_style, picture_of
 from coop_drake.drawing.colours import INK, OBJECT, robot_colour
+from coop_drake.laws import ScheduledGains
+from coop_drake.tuning import CRITERIA, GainTrial, Limit, Objective, Search, TrialOutcome
 from coop_drake.viz import write_figures
 from coop_drake.viz.figures import (
     RunFigures,
@@ -25,6 +25,7 @@ from coop_drake.viz.figures import (
     start_and_goal_figure,
     summary_figure,
 )
+from coop_drake.viz.tuning_figure import tuning_figure
 from tests.support.cases import case
 from tests.support.figure_names import OF_EVERY_RUN, OF_TWO_ROBOTS
 from tests.support.sliding import with_sliding_joint
@@ -165,3 +166,34 @@ def test_a_jump_at_a_switch_is_broken_not_sloped():
     times, values = break_at_switches(log, np.array([1.0, 1.0, 5.0]))
     np.testing.assert_array_equal(times, [0.0, 1.0, 2.0, 2.0])
     np.testing.assert_array_equal(values, [1.0, 1.0, np.nan, 5.0])
+
+
+BEFORE = dict.fromkeys(CRITERIA, 1.0) | {"time": 20.0, "peak_force": 200.0}
+
+
+def trial(time, force, *, arrived=True):
+    values = BEFORE | {"time": time, "peak_force": force} if arrived else {}
+    return GainTrial(ScheduledGains(), TrialOutcome(arrived, float(arrived), values, ""))
+
+
+@pytest.fixture
+def found():
+    objective = Objective({"peak_force": 1.0}, (Limit("time", at_most=True, value=15.0),), BEFORE)
+    search = Search(objective)
+    for one in (trial(20.0, 200.0), trial(0.0, 0.0, arrived=False), trial(14.0, 150.0), trial(14.0, 180.0)):
+        search.add(one)
+    return search
+
+
+def test_the_best_score_falls_from_the_first_run_within_all_limits(found):
+    _, fall = tuning_figure(found).axes
+    (line,) = fall.lines
+    np.testing.assert_allclose(line.get_xydata(), [(2.0, 0.75), (3.0, 0.75)])
+
+
+def test_what_breaks_a_limit_and_what_is_chosen_are_distinguished(found):
+    plane, _ = tuning_figure(found).axes
+    drawn = {line.get_label(): line.get_xydata().tolist() for line in plane.lines if len(line.get_xdata())}
+    assert drawn["breaks a limit"] == [[20.0, 200.0]]
+    assert drawn["keeps all limits"] == [[14.0, 150.0], [14.0, 180.0]]
+    assert drawn["chosen"] == [[14.0, 150.0]]

@@ -1,10 +1,7 @@
 """The recording is one small page that needs nothing else and shows what the log holds."""
 
-from __future__ import annotations
-
 import dataclasses
 import re
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,31 +10,44 @@ from pydrake.geometry import Rgba
 from coop_drake.errors import CoopDrakeError
 from coop_drake.scenario import load_scenario
 from coop_drake.viz import inline_frame, recording_html, write_recording
-from coop_drake.viz.recording import page_content, with_overlay
+from coop_drake.viz.recording import kept_frames, page_content, with_overlay
 from tests.support.cases import case
 from tests.support.recorded import messages, paths, played, track
+from tests.support.scenarios import MODELS
 from tests.support.synthetic_log import synthetic_log, synthetic_plan
 
-MODELS = Path(__file__).parents[2] / "models"
-OBJECT = "/team/illustration/object/body"
+FRAMES = np.linspace(0.0, 1.0, 400)
 
 
-@pytest.fixture(scope="module")
-def page(tmp_path_factory):
-    problem = case("base")
-    scenario = load_scenario(MODELS / "base.scenario.yaml")
-    path = tmp_path_factory.mktemp("recording") / "transport.html"
-    fractions = []
-    write_recording(
-        scenario,
-        synthetic_plan(problem),
-        synthetic_log(problem),
-        path,
-        progress=lambda text, fraction: fractions.append(fraction),
+def between(values, kept):
+    frames = np.arange(len(values))
+    return np.column_stack([np.interp(frames, kept, column[kept]) for column in values.T])
+
+
+@pytest.mark.parametrize("tolerance", [1e-1, 1e-3])
+def test_straight_lines_between_kept_frames_meet_all_frames(tolerance):
+    values = np.column_stack(
+        [np.sin(20.0 * FRAMES), np.abs(FRAMES - 0.4), np.random.default_rng(1).random(400)]
     )
-    assert fractions == sorted(fractions)
-    assert fractions[-1] == 1.0
-    return path
+    kept = kept_frames(values, tolerance, longest=400)
+    assert np.abs(between(values, kept) - values).max() <= tolerance
+
+
+@pytest.mark.parametrize(
+    ("values", "tolerance", "longest", "kept"),
+    [
+        (FRAMES[:, None], 1e-9, 400, [0, 399]),
+        (np.where(FRAMES > 0.5, 1.0, 0.0)[:, None], 0.01, 400, [0, 199, 200, 399]),
+        (np.zeros((100, 1)), 1.0, 30, [0, 30, 60, 90, 99]),
+        (np.zeros((1, 3)), 1.0, 5, [0]),
+    ],
+    ids=["straight line", "jump", "no two further apart than allowed", "one frame"],
+)
+def test_kept_frames_by_hand(values, tolerance, longest, kept):
+    assert kept_frames(values, tolerance, longest=longest) == kept
+
+
+OBJECT = "/team/illustration/object/body"
 
 
 @pytest.fixture(scope="module")
@@ -48,22 +58,6 @@ def text(page):
 def test_the_page_needs_no_network(text):
     assert not re.search(r'<(?:script|link|img|iframe)[^>]+(?:src|href)="(?!data:)', text)
     assert not re.search(r"\b(?:fetch|import|open|WebSocket)\([\"'`](?:https?|wss?):", text)
-
-
-def test_a_minute_of_motion_that_no_straight_line_follows_stays_under_6_mb():
-    problem = case("base")
-    plan, log = synthetic_plan(problem), synthetic_log(problem, samples=1500)
-    shaken = np.random.default_rng(0).normal(0.0, 0.1, (len(log.times), 3))
-    log = dataclasses.replace(
-        log,
-        times=log.times * (60.0 / log.times[-1]),
-        object_pose=log.object_pose + shaken,
-        measured_wrenches=20.0 * shaken[:, None] * np.ones((1, 2, 1)),
-    )
-    plan = dataclasses.replace(plan, cells=10 * plan.cells, transitions=10 * plan.transitions)
-    page = recording_html(load_scenario(MODELS / "base.scenario.yaml"), plan, log)
-    assert len(track(page, OBJECT, "position")[0]) > 1000
-    assert len(page.encode()) < 6e6
 
 
 def test_floor_walls_team_grasps_plan_trail_and_forces_are_in_the_scene(text):
@@ -101,36 +95,6 @@ def test_the_cells_take_turns_as_they_were_logged(text):
             seen = times[visible]
             assert seen.min() == pytest.approx(switches[index - 1], abs=0.05)
             assert times[times > seen.min()][0] == pytest.approx(switches[index], abs=0.05)
-
-
-def test_collision_geometry_moves_with_the_bodies_where_it_is_asked_for():
-    problem, scenario = case("base"), load_scenario(MODELS / "base.scenario.yaml")
-    look = dataclasses.replace(scenario.visualization, show_collision=True)
-    scenario = dataclasses.replace(scenario, visualization=look)
-    page = recording_html(scenario, synthetic_plan(problem), synthetic_log(problem, samples=40))
-    seen, solid = (
-        track(page, f"/team/{role}/object/body", "position") for role in ("illustration", "proximity")
-    )
-    np.testing.assert_array_equal(seen[1], solid[1])
-
-
-def test_the_page_says_how_it_ended():
-    problem, scenario = case("base"), load_scenario(MODELS / "base.scenario.yaml")
-    plan, log = synthetic_plan(problem), synthetic_log(problem)
-    facts = {"duration": 12.0, "colours": [Rgba(0, 0, 1), Rgba(1, 0, 0)], "of_a_metre": 5.0}
-    lost = dataclasses.replace(log, violation="too near at t = 12 s", reached=False)
-    assert page_content(scenario, plan, log, **facts)["verdict"].startswith(
-        "arrived after 12.0 s; smallest clearance "
-    )
-    said = page_content(scenario, plan, lost, **facts)["verdict"]
-    walls, bodies = log.workspace_clearance.min(), log.body_clearance.min()
-    assert (
-        said
-        == f"too near at t = 12 s; smallest clearance {walls:.3f} m to walls, {bodies:.3f} m between bodies"
-    )
-    late = dataclasses.replace(log, reached=False)
-    said = page_content(scenario, plan, late, **facts)["verdict"]
-    assert said.startswith("the goal was not reached within 12.0 s; smallest clearance ")
 
 
 def test_the_goals_frame_is_as_high_as_the_object(text):
@@ -190,25 +154,72 @@ def test_a_page_of_another_make_is_refused():
         with_overlay("<html><body></body></html>", {})
 
 
-def test_nothing_is_left_beside_the_page(page):
-    assert list(page.parent.iterdir()) == [page]
-
-
-def test_a_run_that_starts_at_its_goal_is_recorded(tmp_path):
-    problem = case("base")
-    one = synthetic_log(problem)
-    one = dataclasses.replace(one, **{name: getattr(one, name)[:1] for name in _histories(one)})
-    path = tmp_path / "transport.html"
-    write_recording(load_scenario(MODELS / "base.scenario.yaml"), synthetic_plan(problem), one, path)
-    assert path.stat().st_size > 1e6
-
-
-def _histories(log):
-    return [
-        field.name for field in dataclasses.fields(log) if isinstance(getattr(log, field.name), np.ndarray)
-    ]
-
-
 def test_a_page_goes_into_a_notebook_unharmed():
     assert 'srcdoc="&lt;"' not in inline_frame("<p>")
     assert 'srcdoc="<p class=&quot;a&quot;>&amp;amp;"' in inline_frame('<p class="a">&amp;')
+
+
+def base(**log):
+    """The shipped scenario with a plan and a log."""
+    problem = case("base")
+    scenario = load_scenario(MODELS / "base.scenario.yaml")
+    return scenario, synthetic_plan(problem), synthetic_log(problem, **log)
+
+
+@pytest.fixture(scope="module")
+def page(tmp_path_factory):
+    path, fractions = tmp_path_factory.mktemp("recording") / "transport.html", []
+    write_recording(*base(), path, progress=lambda text, fraction: fractions.append(fraction))
+    assert fractions == sorted(fractions)
+    assert fractions[-1] == 1.0
+    assert list(path.parent.iterdir()) == [path]
+    return path
+
+
+def test_a_minute_of_motion_that_no_straight_line_follows_stays_under_6_mb():
+    scenario, plan, log = base(samples=1500)
+    shaken = np.random.default_rng(0).normal(0.0, 0.1, (len(log.times), 3))
+    log = dataclasses.replace(
+        log,
+        times=log.times * (60.0 / log.times[-1]),
+        object_pose=log.object_pose + shaken,
+        measured_wrenches=20.0 * shaken[:, None] * np.ones((1, 2, 1)),
+    )
+    plan = dataclasses.replace(plan, cells=10 * plan.cells, transitions=10 * plan.transitions)
+    page = recording_html(scenario, plan, log)
+    assert len(track(page, OBJECT, "position")[0]) > 1000
+    assert len(page.encode()) < 6e6
+
+
+def test_collision_geometry_moves_with_the_bodies_where_it_is_asked_for():
+    scenario, plan, log = base(samples=40)
+    look = dataclasses.replace(scenario.visualization, show_collision=True)
+    page = recording_html(dataclasses.replace(scenario, visualization=look), plan, log)
+    seen, solid = (
+        track(page, f"/team/{role}/object/body", "position") for role in ("illustration", "proximity")
+    )
+    np.testing.assert_array_equal(seen[1], solid[1])
+
+
+@pytest.mark.parametrize(
+    ("end", "words"),
+    [
+        ({}, "arrived after 12.0 s"),
+        ({"violation": "too near at t = 12 s", "reached": False}, "too near at t = 12 s"),
+        ({"reached": False}, "the goal was not reached within 12.0 s"),
+    ],
+)
+def test_the_page_says_how_it_ended(end, words):
+    scenario, plan, log = base()
+    facts = {"duration": 12.0, "colours": [Rgba(0, 0, 1), Rgba(1, 0, 0)], "of_a_metre": 5.0}
+    said = page_content(scenario, plan, dataclasses.replace(log, **end), **facts)["verdict"]
+    walls, bodies = log.workspace_clearance.min(), log.body_clearance.min()
+    assert said == f"{words}; smallest clearance {walls:.3f} m to walls, {bodies:.3f} m between bodies"
+
+
+def test_a_run_that_starts_at_its_goal_is_recorded(tmp_path):
+    scenario, plan, log = base()
+    histories = {name: value[:1] for name, value in vars(log).items() if isinstance(value, np.ndarray)}
+    path = tmp_path / "transport.html"
+    write_recording(scenario, plan, dataclasses.replace(log, **histories), path)
+    assert path.stat().st_size > 1e6

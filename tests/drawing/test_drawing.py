@@ -1,10 +1,14 @@
-"""Meshes keep the area of what they stand for."""
+"""Figures repeat byte for byte, walls look like walls, meshes keep areas, the camera sees the floor."""
 
 import numpy as np
 import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
 from shapely import Point, Polygon, box
 
+from coop_drake.drawing.canvas import draw_workspace, new_figure, save_figure
 from coop_drake.drawing.solids import (
+    camera_pose,
     flat_mesh,
     joined,
     ribbon_mesh,
@@ -13,6 +17,57 @@ from coop_drake.drawing.solids import (
     tube_mesh,
     wall_polygons,
 )
+
+
+@pytest.mark.parametrize(("suffix", "begins"), [(".png", b"\x89PNG"), (".svg", b"<?xml")])
+def test_the_same_figure_gives_the_same_bytes_of_the_kind_that_the_name_asks_for(tmp_path, suffix, begins):
+    written = []
+    for name in ("a", "b"):
+        figure = new_figure(3.0, 2.0, "A caption.")
+        figure.subplots().plot([0.0, 1.0], [0.0, 1.0])
+        save_figure(figure, tmp_path / (name + suffix))
+        written.append((tmp_path / (name + suffix)).read_bytes())
+    assert written[0] == written[1]
+    assert written[0].startswith(begins)
+
+
+PILLAR = [(1, 1), (3, 1), (3, 3), (1, 3)]
+
+
+@pytest.mark.parametrize("ring", [PILLAR, PILLAR[::-1]], ids=["counter-clockwise", "clockwise"])
+def test_a_pillar_has_the_colour_of_the_walls_whichever_way_its_ring_goes(ring):
+    canvas = FigureCanvasAgg(Figure())
+    ax = canvas.figure.subplots()
+    draw_workspace(ax, Polygon([(0, 0), (4, 0), (4, 4), (0, 4)], [ring]))
+    canvas.draw()
+    picture = np.asarray(canvas.buffer_rgba())
+
+    def colour(x, y):
+        column, row = ax.transData.transform((x, y))
+        return picture[len(picture) - int(row), int(column)].tolist()
+
+    assert colour(2.0, 2.1) == colour(-0.15, 2.1) != colour(0.5, 2.1)
+
+
+@pytest.mark.parametrize("turn", [0.0, 0.7])
+@pytest.mark.parametrize("floor", [box(0, 0, 7, 10), box(-20, 3, 20, 6), box(0, 0, 1, 30)])
+def test_every_corner_is_in_the_picture_and_the_picture_is_filled(floor, turn):
+    position, target = camera_pose(floor, 0.5, turn=turn)
+    forward = (target - position) / np.linalg.norm(target - position)
+    right = np.array([np.cos(turn), np.sin(turn), 0.0])
+    up = np.cross(right, forward)
+    x_min, y_min, x_max, y_max = floor.bounds
+    corners = (
+        np.array([[x, y, z] for x in (x_min, x_max) for y in (y_min, y_max) for z in (0.0, 0.5)]) - position
+    )
+    half = np.tan(np.radians(75) / 2)
+    seen = (
+        np.column_stack([corners @ right / (half * 4 / 3), corners @ up / half])
+        / (corners @ forward)[:, None]
+    )
+    assert np.abs(seen).max() < 1.0
+    assert np.abs(seen).max() > 0.8
+
 
 FLOOR = Polygon([(0, 0), (4, 0), (4, 3), (2, 1), (0, 3)], [[(1, 0.5), (2, 0.5), (2, 0.8)]])
 

@@ -1,0 +1,95 @@
+"""Obstacles on the floor and the colours of robots."""
+
+import pytest
+from pydrake.geometry import Meshcat
+from pydrake.systems.framework import DiagramBuilder
+from shapely import Polygon, box
+
+from coop_drake.drawing.colours import robot_colour
+from coop_drake.plant import build_team_plant
+from coop_drake.scenario import load_scenario
+from coop_drake.viz.scene import TeamView, hex_colour, illustrations, paint_robots, set_stage
+from tests.support.scenarios import MODELS
+
+FLOOR = box(0, 0, 6, 5)
+
+
+SHELF, PILLAR = Polygon([(1, 1), (3, 1.5), (2.9, 1.9), (0.9, 1.4)]), box(4, 3, 4.4, 3.3)
+
+
+@pytest.fixture
+def standing():
+    meshcat = Meshcat()
+    set_stage(meshcat, FLOOR - SHELF - PILLAR, 0.5)
+    return meshcat
+
+
+def test_a_long_obstacle_is_a_shelf_and_a_short_one_a_pillar(standing):
+    kinds = sorted(
+        f"{kind}/{index}"
+        for kind in ("shelves", "pillars")
+        for index in ("00", "01")
+        if standing.HasPath(f"/stage/{kind}/{index}")
+    )
+    assert len(kinds) == 2
+    assert {kind.split("/")[0] for kind in kinds} == {"shelves", "pillars"}
+
+
+def test_an_obstacle_that_is_not_convex_is_a_wall():
+    corner = Polygon([(1, 1), (3, 1), (3, 1.2), (1.2, 1.2), (1.2, 3), (1, 3)])
+    meshcat = Meshcat()
+    set_stage(meshcat, FLOOR - corner - PILLAR, 0.5)
+    assert not meshcat.HasPath("/stage/shelves/00")
+    assert meshcat.HasPath("/stage/pillars/00")
+    assert not meshcat.HasPath("/stage/pillars/01")
+
+
+def test_floor_grid_and_walls_stand_on_every_stage(standing):
+    for name in ("floor", "grid", "walls", "edges/foot", "edges/top"):
+        assert standing.HasPath(f"/stage/{name}")
+
+
+def test_a_floor_smaller_than_a_metre_needs_no_grid():
+    meshcat = Meshcat()
+    set_stage(meshcat, box(0.2, 0.2, 0.9, 0.8), 0.5)
+    assert meshcat.HasPath("/stage/floor")
+
+
+@pytest.fixture
+def twins(tmp_path):
+    """The shipped team with two robots of the same model."""
+    path = tmp_path / "twins.scenario.yaml"
+    path.write_text((MODELS / "base.scenario.yaml").read_text().replace("long_orange", "long_blue"))
+    return load_scenario(path)
+
+
+def painted(team, body):
+    inspector = team.scene_graph.model_inspector()
+    known = [inspector.GetIllustrationProperties(one) for one in illustrations(team, body)]
+    return {hex_colour(one.GetProperty("phong", "diffuse")) for one in known}
+
+
+def test_robots_of_one_model_get_the_colours_of_the_figures(twins):
+    builder = DiagramBuilder()
+    team = build_team_plant(twins, builder)
+    assert [hex_colour(one) for one in paint_robots(team)] == [robot_colour(k).lower() for k in (0, 1)]
+    builder.Build()
+    first, second = (painted(team, robot.base_body) for robot in team.robots)
+    assert robot_colour(0).lower() in first
+    assert robot_colour(1).lower() in second
+    # The chassis is grey in both.
+    assert len(first & second) == 1
+
+
+def test_the_scene_paints_arrows_and_grasps_alike(twins):
+    assert hex_colour(TeamView(twins, Meshcat()).colours[1]) == robot_colour(1).lower()
+
+
+def test_robots_of_different_models_keep_their_colours():
+    builder = DiagramBuilder()
+    team = build_team_plant(load_scenario(MODELS / "base.scenario.yaml"), builder)
+    before = [painted(team, robot.base_body) for robot in team.robots]
+    colours = [hex_colour(one) for one in paint_robots(team)]
+    builder.Build()
+    assert [painted(team, robot.base_body) for robot in team.robots] == before
+    assert len(set(colours)) == 2
