@@ -14,7 +14,6 @@ from pydrake.systems.primitives import (
     DiscreteTimeDelay,
     FirstOrderLowPassFilter,
     Gain,
-    LinearSystem,
     Multiplexer,
     PassThrough,
     TrajectorySource,
@@ -34,21 +33,18 @@ from coop_drake.systems import (
     MessageChannel,
     ShiftedMeasurement,
     build_selector,
-    clear_channel,
 )
 from coop_drake.tree.pose import FloatArray
 
 
-def build_radio(deployment: Deployment, robot: int, use: int = 0) -> MessageChannel | LinearSystem:
+def build_radio(deployment: Deployment, robot: int, use: int = 0) -> MessageChannel:
     """Build the channel of a robot's reports in a sampled team.
 
     The use of the seed is 3 for its requests to the hold supervisor, and 4 for what it hears of this.
     """
-    messages, period = deployment.messages, deployment.period or 0.0
-    if messages == Messages():
-        return clear_channel(period)
+    messages = deployment.messages
     return MessageChannel(
-        period,
+        deployment.period or 0.0,
         delay=messages.delay,
         loss=messages.loss,
         repeat=messages.repeat,
@@ -487,9 +483,9 @@ def deploy(
     In the order of the signals: ``robot_state`` and ``object_pose`` get their constant errors, noise, a delay
     and losses; ``current_cell`` gets the error of the clock and a delay; ``robot_effort`` fails where the
     motors do, is held for a period, then limited, then lags; ``ready`` stops where the robot is silent, then
-    goes through a :class:`MessageChannel`, or a hold where nothing is lost or late; so do messages about
-    holds, to the supervisor and back. The limit is always
-    there: that of the actuators, or where none is given, one so high that only a diverging run reaches it.
+    goes through a :class:`MessageChannel`; so do messages about holds, to the supervisor and back. The limit
+    is always there: that of the actuators, or where none is given, one so high that only a diverging run
+    reaches it.
 
     Args:
         controller: From :func:`build_robot_controller`, with the same period.

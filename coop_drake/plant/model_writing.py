@@ -202,45 +202,10 @@ def _model(
 ) -> str:
     (ixx, ixy, _), (_, iyy, _), (_, _, izz) = properties.inertia.tolist()
     x, y = properties.centroid.tolist()
-    shapes = "".join(
-        _shape(kind, mesh, index) for index, mesh in enumerate(meshes) for kind in ("visual", "collision")
-    )
-    frames = "".join(
-        f'    <frame name="grasp_{index}" attached_to="body">\n'
-        f"      <pose>{gx:.12g} {gy:.12g} 0 0 0 {facing:.16g}</pose>\n    </frame>\n"
-        for index, (gx, gy, facing) in enumerate(grasps)
-    )
-    return f"""<?xml version="1.0"?>
-<sdf version="1.9">
-  <model name="{name}">
-    <link name="body">
-      <pose>0 0 {elevation:.12g} 0 0 0</pose>
-      <inertial>
-        <pose>{x:.16g} {y:.16g} 0 0 0 0</pose>
-        <mass>{properties.mass:.16g}</mass>
-        <inertia>
-          <ixx>{ixx:.16g}</ixx>
-          <iyy>{iyy:.16g}</iyy>
-          <izz>{izz:.16g}</izz>
-          <ixy>{ixy:.16g}</ixy>
-          <ixz>0</ixz>
-          <iyz>0</iyz>
-        </inertia>
-      </inertial>
-{shapes}    </link>
-{frames}  </model>
-</sdf>
-"""
-
-
-def _shape(kind: str, mesh: str, index: int) -> str:
-    declared = "            <drake:declare_convex/>\n" if kind == "collision" else ""
-    colour = f"        <material>\n          <diffuse>{OBJECT_IN_MODELS}</diffuse>\n        </material>\n"
-    return (
-        f'      <{kind} name="{kind}_{index}">\n        <geometry>\n          <mesh>\n'
-        f"            <uri>{mesh}</uri>\n{declared}          </mesh>\n        </geometry>\n"
-        f"{colour if kind == 'visual' else ''}      </{kind}>\n"
-    )
+    inertial = _inertial(f"{x:.16g} {y:.16g} 0", properties.mass, (ixx, iyy, izz, ixy), digits=16)
+    solids = [("0 0 0", f"<mesh><uri>{mesh}</uri><drake:declare_convex/></mesh>") for mesh in meshes]
+    body = _link("body", f"0 0 {elevation:.12g} 0 0 0", inertial, solids, OBJECT_IN_MODELS)
+    return _sdf(name, "\n".join([body, *_grasp_frames(grasps, 12)]), "A polygonal body in convex parts.")
 
 
 # Writes the models of a new scenario: a box to carry, and a disc base with an arm of a few links.
@@ -287,19 +252,15 @@ def boxes_model(
         mass: Mass [kg], spread evenly over the boxes' bounding box for the moments of inertia.
         comment: What the file says of itself.
     """
-    frames = "\n".join(
-        f'    <frame name="grasp_{k}" attached_to="body"><pose>{x:.9g} {y:.9g} 0 0 0 {yaw!r}</pose></frame>'
-        for k, (x, y, yaw) in enumerate(grasps)
-    )
     length, width = (
         max(box[k] + 0.5 * box[k + 2] for box in boxes) - min(box[k] - 0.5 * box[k + 2] for box in boxes)
         for k in (0, 1)
     )
     moments = _box(length, width, 0.2)[1]
     solids = [(f"{x:.9g} {y:.9g} 0", _box(a, b, 0.2)[0]) for x, y, a, b in boxes]
-    pose = f"0 0 {_ARM_HEIGHT} 0 0 0"
-    body = _link("body", pose, "0 0 0", solids, moments, mass, OBJECT_IN_MODELS)
-    return _sdf("object", f"{body}\n{frames}", comment)
+    pose, inertial = f"0 0 {_ARM_HEIGHT} 0 0 0", _inertial("0 0 0", mass, [mass * one for one in moments])
+    body = _link("body", pose, inertial, solids, OBJECT_IN_MODELS)
+    return _sdf("object", "\n".join([body, *_grasp_frames(grasps)]), comment)
 
 
 def robot_model(
@@ -320,13 +281,15 @@ def robot_model(
     )
     kinds = slides or (None,) * (len(links) - 1)
     base = [("0 0 0.25", disc[0])]
-    parts = [_link("base", "0 0 0 0 0 0", "0 0 0.25", base, disc[1], 6.0, BASE_IN_MODELS)]
+    inertial = _inertial("0 0 0.25", 6.0, [6.0 * one for one in disc[1]])
+    parts = [_link("base", "0 0 0 0 0 0", inertial, base, BASE_IN_MODELS)]
     for number, length in enumerate(links, start=1):
         frame = f'<pose relative_to="joint_{number}"/>'
         pose = f"0 0 {_ARM_HEIGHT} 0 0 0" if number == 1 else ""
         solid, moments = _box(length, _LINK_WIDTH, _LINK_HEIGHT)
         centre = f"{0.5 * length:.9g} 0 0"
-        link = _link(f"link_{number}", pose, centre, [(centre, solid)], moments, 1.0, LINK_IN_MODELS)
+        inertial = _inertial(centre, 1.0, moments)
+        link = _link(f"link_{number}", pose, inertial, [(centre, solid)], LINK_IN_MODELS)
         parts.append(link if number == 1 else link.replace("<pose></pose>", frame, 1))
         parts.append(_MOUNT if number == 1 else _joint(number, links[number - 2], kinds[number - 2]))
     tip = f"{links[-1]:.9g} 0 0 0 0 {pi!r}"
@@ -362,24 +325,30 @@ def _box(length: float, width: float, height: float) -> Shape:
     return f"<box><size>{length:.9g} {width:.9g} {height:.9g}</size></box>", moments
 
 
-def _link(
-    name: str,
-    pose: str,
-    centre: str,
-    solids: Sequence[tuple[str, str]],
-    moments: tuple[float, float, float],
-    mass: float,
-    colour: str,
-) -> str:
+def _grasp_frames(grasps: Sequence[Point], digits: int = 9) -> list[str]:
+    """Frames at (x, y) [m] that face an angle [rad]."""
+    return [
+        f'    <frame name="grasp_{k}" attached_to="body">'
+        f"<pose>{x:.{digits}g} {y:.{digits}g} 0 0 0 {float(yaw)!r}</pose></frame>"
+        for k, (x, y, yaw) in enumerate(grasps)
+    ]
+
+
+def _inertial(centre: str, mass: float, moments: Sequence[float], digits: int = 9) -> str:
+    """Mass [kg] and moments xx, yy, zz, and perhaps xy, about the centre of mass [kg m^2]."""
+    m, xx, yy, zz, xy = (f"{value:.{digits}g}" for value in (mass, *moments, 0.0)[:5])
+    return f"""      <inertial>
+        <pose>{centre} 0 0 0</pose>
+        <mass>{m}</mass>
+        <inertia><ixx>{xx}</ixx><iyy>{yy}</iyy><izz>{zz}</izz><ixy>{xy}</ixy><ixz>0</ixz><iyz>0</iyz></inertia>
+      </inertial>"""
+
+
+def _link(name: str, pose: str, inertial: str, solids: Sequence[tuple[str, str]], colour: str) -> str:
     shapes = "\n".join(_solid(*solid, str(k or ""), colour) for k, solid in enumerate(solids))
-    xx, yy, zz = (f"{mass * moment:.9g}" for moment in moments)
     return f"""    <link name="{name}">
       <pose>{pose}</pose>
-      <inertial>
-        <pose>{centre} 0 0 0</pose>
-        <mass>{mass:.9g}</mass>
-        <inertia><ixx>{xx}</ixx><iyy>{yy}</iyy><izz>{zz}</izz><ixy>0</ixy><ixz>0</ixz><iyz>0</iyz></inertia>
-      </inertial>
+{inertial}
 {shapes}
     </link>"""
 

@@ -27,7 +27,6 @@ from coop_drake.systems.messages import (
     Interruption,
     MessageChannel,
     TeamLink,
-    clear_channel,
     robot_record,
     supervisor_record,
 )
@@ -79,7 +78,6 @@ __all__ = [
     "axis_laws",
     "build_selector",
     "build_separate_sensor",
-    "clear_channel",
     "robot_record",
     "supervisor_record",
 ]

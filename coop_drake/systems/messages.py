@@ -8,7 +8,6 @@ from typing import Protocol
 
 import numpy as np
 from pydrake.systems.framework import BasicVector, Context, DiscreteValues
-from pydrake.systems.primitives import LinearSystem
 
 from coop_drake.laws.measurements import (
     NOTHING,
@@ -75,20 +74,6 @@ class MessageChannel(Block):
             return True, False
         lost, repeated = uniform_pair(self._seed, period_of(context.get_time(), self._period))
         return lost >= self._loss, repeated < self._repeat
-
-
-def clear_channel(period: float) -> LinearSystem:
-    """Build a channel that neither loses nor delays reports: a zero-order hold, empty at first.
-
-    Its input and output are those of :class:`MessageChannel`, reports of shape (2,), under Drake's names.
-
-    Args:
-        period: Time between two reports [s].
-    """
-    passed, no = np.eye(READY_SIZE), np.zeros((READY_SIZE, READY_SIZE))
-    hold = LinearSystem(A=no, B=passed, C=passed, D=no, time_period=period)
-    hold.configure_default_state(np.full(READY_SIZE, NOTHING))
-    return hold
 
 
 class Interruption(Block):

@@ -16,7 +16,6 @@ from coop_drake.systems import (
     HoldSupervisor,
     MessageChannel,
     axis_laws,
-    clear_channel,
 )
 from tests.support.small_plan import small_plan
 from tests.support.system_checks import context_with, evaluate, port_sizes
@@ -57,14 +56,8 @@ def test_before_the_first_report_none_counts():
 
 
 def test_a_good_channel_passes_every_report_on():
+    assert not MessageChannel(PERIOD).HasAnyDirectFeedthrough()
     assert heard(MessageChannel(PERIOD)) == list(range(12))
-
-
-def test_a_clear_channel_is_one_that_neither_loses_nor_delays():
-    clear = clear_channel(PERIOD)
-    assert not clear.HasAnyDirectFeedthrough()
-    np.testing.assert_array_equal(clear.get_output_port().Eval(clear.CreateDefaultContext()), NEVER)
-    assert heard(clear) == heard(MessageChannel(PERIOD)) == list(range(12))
 
 
 @pytest.mark.parametrize(("delay", "periods"), [(0.1, 1), (0.3, 3), (0.25, 3), (0.30000000000000004, 3)])
