@@ -277,6 +277,7 @@ MISTAKES = {
         "directives",
         "none.sdf",
     ),
+    "welds before models": ({"directives": ROOM["directives"][::-1]}, "directives", "robot_1"),
 }
 
 

@@ -115,6 +115,3 @@ def _places(value: Any, kind: Any, path: Place) -> Iterator[tuple[Place, Any]]:
         elif origin is dict:
             for name, item in value.items():
                 yield from _places(item, arguments[1], (*path, name))
-
-
-__all__ = ["flow", "schema_mutants"]

@@ -143,6 +143,3 @@ def _bombs(text: str) -> Iterator[Mutant]:
         yield Mutant(
             f"{kind} that holds itself", "planner", "it has no end", (text + f"planner: {value}\n").encode()
         )
-
-
-__all__ = ["encoding_mutants", "yaml_mutants"]
