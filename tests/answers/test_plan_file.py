@@ -1,4 +1,4 @@
-"""Plans on disk: nothing is lost, the bytes are stable, and wrong files are refused by key."""
+"""Plans on disk: nothing is lost, bytes are stable, wrong files are refused by key; table 1 as Markdown."""
 
 import json
 from dataclasses import fields, replace
@@ -9,11 +9,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from shapely import Polygon, box
 
-from coop_drake.answers import load_plan, save_plan
+from coop_drake.answers import load_plan, save_plan, table_1
 from coop_drake.errors import PlanError
 from coop_drake.laws import ScheduledGains
 from coop_drake.planning import make_plan
+from tests.support.cases import case
 from tests.support.channels import bent_channel
+from tests.support.mutants.mutant import put
+from tests.support.synthetic_log import synthetic_plan
 
 
 @pytest.fixture(scope="module")
@@ -75,108 +78,41 @@ def test_holes_are_kept(plan, tmp_path):
     assert_same(loaded, changed)
 
 
-def drop(*way):
-    def change(document):
-        place = document
-        for step in way[:-1]:
-            place = place[step]
-        del place[way[-1]]
-
-    return change
-
-
-def put(value, *way):
-    def change(document):
-        place = document
-        for step in way[:-1]:
-            place = place[step]
-        place[way[-1]] = value
-
-    return change
-
-
 BOW = {"outer": [[0, 0], [1, 1], [1, 0], [0, 1]], "holes": []}
 FAR = {"outer": [[90, 90], [91, 90], [91, 91]], "holes": []}
 
 
 @pytest.mark.parametrize(
-    ("change", "message"),
+    ("place", "value", "message"),
     [
-        (drop("goal_pose"), r"goal_pose: None is not allowed; expected a value; this key is required"),
         (
-            drop("cells", 1, "upper"),
-            r"cells\[1\].upper: None is not allowed; expected a value; this key is required",
-        ),
-        (
-            put(1, "colour"),
+            ("colour",),
+            1,
             r"colour: 1 is not allowed; expected one of the keys problem, gain_set, joint_names",
         ),
-        (put("song", "format"), r"format: 'song' is not allowed; expected 'coop_drake plan'"),
-        (put(1, "version"), r"version: 1 is not allowed; expected 4"),
-        (put(True, "version"), r"version: True is not allowed"),
-        (put(7, "gain_set"), r"gain_set: 7 is not allowed; expected a text"),
+        (("version",), True, r"version: True is not allowed; expected 4"),
+        (("transitions", 0, "length"), -0.1, r"transitions\[0\].length: -0.1 .* zero or a positive number"),
+        (("start", 2), float("nan"), r"start\[2\]: nan is not allowed; expected a finite number"),
+        (("goal_pose",), [0.0] * 4, r"goal_pose: .* is not allowed; expected 3 entries, not 4"),
+        (("cells", 0, "lower", 1), 9.0, r"cells\[0\].upper\[1\]: .* more than cells\[0\].lower\[1\], 9"),
+        (("cells", 2, "tidied"), BOW, r"cells\[2\].tidied: .* cross neither .*Self-intersection"),
+        (("cells", 1, "tidied"), FAR, r"transitions\[0\].target: .* inside cells\[1\].tidied"),
+        (("transitions", 1, "path"), [[0.0, 0.0]], r"transitions\[1\].path: .* at least 2 points"),
+        (("transitions", 0, "target"), [90.0, 90.0], r"transitions\[0\].target: .* cells\[0\].tidied"),
+        (("transitions", 0, "goal_lower", 0), -9.0, r"transitions\[0\].goal_lower.* axis 0: \[-9.0"),
         (
-            put(-0.1, "transitions", 0, "length"),
-            r"transitions\[0\].length: -0.1 is not allowed; expected zero or a positive number",
+            ("transitions", 0, "gains", "funnel"),
+            "loose",
+            r"\[0\].gains.funnel: .* exponential, quintic",
         ),
-        (put(float("nan"), "start", 2), r"start\[2\]: nan is not allowed; expected a finite number"),
-        (put("a", "start", 0), r"start\[0\]: 'a' is not allowed"),
-        (put([0.0, 1.0], "goal_pose"), r"goal_pose: .* is not allowed; expected 3 entries, not 2"),
-        (put([0.0] * 4, "goal_pose"), r"goal_pose: .* is not allowed; expected 3 entries, not 4"),
-        (put({}, "cells"), r"cells: \{\} is not allowed; expected a list"),
-        (put([], "cells"), r"cells: \[\] is not allowed"),
-        (put([0.0] * 2, "cells", 0, "lower"), r"cells\[0\].lower: .* expected 3 entries, not 2"),
-        (
-            put(9.0, "cells", 0, "lower", 1),
-            r"cells\[0\].upper\[1\]: .* expected more than cells\[0\].lower\[1\], 9",
-        ),
-        (put(BOW, "cells", 2, "tidied"), r"cells\[2\].tidied: .* cross neither .*Self-intersection"),
-        (
-            put([[0, 0]], "cells", 2, "tidied", "outer"),
-            r"cells\[2\].tidied.outer: .* a list of at least 3 corners",
-        ),
-        (
-            put([0, 0, 0], "cells", 2, "tidied", "outer", 1),
-            r"cells\[2\].tidied.outer\[1\]: .* expected a list of 2",
-        ),
-        (put(FAR, "cells", 1, "tidied"), r"transitions\[0\].target: .* inside cells\[1\].tidied"),
-        (
-            put([[0.0, 0.0]], "transitions", 1, "path"),
-            r"transitions\[1\].path: .* expected a list of at least 2 points",
-        ),
-        (
-            put([90.0, 90.0], "transitions", 0, "target"),
-            r"transitions\[0\].target: .* inside cells\[0\].tidied",
-        ),
-        (put(-9.0, "transitions", 0, "goal_lower", 0), r"transitions\[0\].goal_lower.* axis 0: \[-9.0"),
-        (drop("transitions", 2), r"transitions: .* expected 3 entries, not 2"),
-        (
-            put(0.0, "transitions", 0, "neck"),
-            r"transitions\[0\].neck: 0.0 is not allowed; expected a positive number",
-        ),
-        (
-            put(1, "transitions", 0, "only_angles"),
-            r"transitions\[0\].only_angles: 1 is not allowed; expected true or false",
-        ),
-        (
-            put("loose", "transitions", 0, "gains", "funnel"),
-            r"transitions\[0\].gains.funnel: 'loose' .* one of exponential, quintic",
-        ),
-        (
-            put([1, 1, -1], "transitions", 0, "gains", "decay_rate"),
-            r"transitions\[0\].gains.decay_rate\[2\]: -1 is not allowed",
-        ),
-        (put([90.0, 90.0, 0, 0, 0], "start"), r"start: .* expected a configuration in cells\[0\]"),
-        (put("other", "problem"), r"digest: .* the content is not what was written"),
-        (put(3.0, "transitions", 0, "length"), r"digest: .* the content is not what was written"),
-        (put("0" * 64, "digest"), r"digest: '0000"),
+        (("start",), [90.0, 90.0, 0, 0, 0], r"start: .* expected a configuration in cells\[0\]"),
+        (("problem",), "other", r"digest: .* the content is not what was written"),
+        (("digest",), "0" * 64, r"digest: '0000"),
     ],
 )
-def test_wrong_files_are_refused_by_file_key_value_and_what_is_allowed(saved, change, message):
-    document = json.loads(saved.read_text())
-    change(document)
-    saved.write_text(json.dumps(document))
-    with pytest.raises(PlanError, match=r"plan\.json: " + message):
+def test_wrong_files_are_refused_by_file_key_value_and_what_is_allowed(saved, place, value, message):
+    saved.write_text(json.dumps(put(json.loads(saved.read_text()), place, value)))
+    with pytest.raises(PlanError, match=r"plan\.json: .*" + message):
         load_plan(saved)
 
 
@@ -193,3 +129,15 @@ def test_files_that_are_no_json_or_not_there_are_refused(tmp_path):
     path.write_text("[1, 2]")
     with pytest.raises(PlanError, match=r"document: .* expected a mapping"):
         load_plan(path)
+
+
+def test_every_cell_has_a_row_with_the_bounds_of_every_axis():
+    plan = synthetic_plan(case("base"))
+    rows = [line for line in table_1(plan).splitlines() if line.startswith("|")]
+    cells = [[entry.strip() for entry in row.strip("|").split("|")] for row in rows]
+    assert cells[0][:3] == ["cell", "theta lower", "theta upper"]
+    assert cells[0][3:] == [f"{name} {bound}" for name in plan.joint_names for bound in ("lower", "upper")]
+    assert len(cells) == 2 + len(plan.cells)
+    first = [f"{value:.3f}" for k in range(3) for value in (plan.cells[0].lower[k], plan.cells[0].upper[k])]
+    assert cells[2] == ["1", *first]
+    assert {len(row) for row in cells} == {7}

@@ -1,22 +1,32 @@
-"""Scenario files become values: the shipped ones, short ones, and those that a program writes."""
+"""Scenario files become values: shipped and short ones, presets, gain sets in files of their own."""
 
 import dataclasses
 import re
+from dataclasses import replace
 
+import numpy as np
 import pytest
 from shapely import normalize
 
 from coop_drake.answers.problem import PlannerSettings
-from coop_drake.laws.gains import FixedGains, ScheduledGains
+from coop_drake.errors import ScenarioError
+from coop_drake.laws import FixedGains, ScheduledGains
 from coop_drake.scenario import (
+    ActuatorLimits,
+    Deployment,
+    Measurements,
     Scenario,
     SimulatorSettings,
     Tolerances,
+    dump_gains,
     dump_scenario,
     load_scenario,
+    with_gains,
 )
+from coop_drake.typed_data import convert_class
 from tests.support.cases import CASES, case
-from tests.support.edited_scenario import MODELS, shipped, write_edited
+from tests.support.edited_scenario import shipped, write_edited
+from tests.support.scenarios import MODELS, write_scenario
 
 SHORT = """
 workspace:
@@ -117,3 +127,143 @@ def test_part_of_a_shipped_gain_set_can_be_changed(tmp_path):
 def test_scenario_is_frozen():
     with pytest.raises(dataclasses.FrozenInstanceError, match=re.escape("cannot assign to field 'object'")):
         shipped("base").object = "other"
+
+
+MOBILE_BASE = convert_class({"preset": "mobile_base"}, Deployment)
+
+
+def loaded(tmp_path, deployment):
+    path = tmp_path / "real.scenario.yaml"
+    path.write_text((MODELS / "base.scenario.yaml").read_text() + f"deployment: {deployment}\n")
+    return load_scenario(path)
+
+
+def test_the_preset_stands_for_its_departures(tmp_path):
+    read = loaded(tmp_path, "{preset: mobile_base}").deployment
+    assert read == MOBILE_BASE
+    assert (read.control_rate, read.mass_error, read.messages.loss) == (200.0, 0.2, 0.2)
+    assert (read.measurements.delay, read.measurements.position_noise) == (0.01, 0.001)
+    assert (read.actuators.base_force, read.actuators.lag) == (650.0, 0.005)
+    assert read.command_age == pytest.approx(0.0175)
+
+
+def test_keys_beside_the_preset_replace_its_own_and_no_others(tmp_path):
+    read = loaded(tmp_path, "{preset: mobile_base, mass_error: -0.2, measurements: {delay: 0}}").deployment
+    measurements = replace(MOBILE_BASE.measurements, delay=0.0)
+    assert read == replace(MOBILE_BASE, mass_error=-0.2, measurements=measurements)
+    unlimited = loaded(tmp_path, "{preset: mobile_base, actuators: {base_force: null}}").deployment
+    assert (unlimited.actuators.base_force, unlimited.actuators.lag) == (None, 0.005)
+
+
+def test_a_preset_of_null_is_none(tmp_path):
+    assert loaded(tmp_path, "{preset: null, mass_error: 0.1}").deployment == Deployment(mass_error=0.1)
+
+
+def test_a_scenario_with_a_preset_is_written_and_read_back(tmp_path):
+    scenario = loaded(tmp_path, "{preset: mobile_base, actuators: {base_force: null}}")
+    again = tmp_path / "again.scenario.yaml"
+    again.write_text(dump_scenario(scenario))
+    assert load_scenario(again).deployment == scenario.deployment
+
+
+@pytest.mark.parametrize(
+    ("deployment", "message"),
+    [
+        ("{preset: forklift}", "deployment.preset: 'forklift' .* one of mobile_base, or null"),
+        ("{preset: 3}", "deployment.preset: 3 .* one of mobile_base, or null"),
+        ("{preset: mobile_base, actuators: 5}", "deployment.actuators: 5 .* a mapping"),
+        ("{preset: mobile_base, measurements: {lateness: 1}}", "deployment.measurements.lateness"),
+    ],
+)
+def test_what_is_wrong_is_refused_with_its_key(tmp_path, deployment, message):
+    with pytest.raises(ScenarioError, match=message):
+        loaded(tmp_path, deployment)
+
+
+@pytest.mark.parametrize(
+    ("measurements", "periods"),
+    [
+        ("{}", 0.0),
+        ("{loss: 0.5}", 1.0 + 2.0 * 2.0**0.5),
+        ("{late: 0.5, late_by: 1}", 1.0 + 2.0 * 2.0**0.5),
+        ("{late: 1, late_by: 0.03}", 6.0),
+        ("{loss: 0.2, late: 0.375, late_by: 0.01}", 1.0 + 2.0 * 2.0**0.5),
+    ],
+)
+def test_gains_count_how_much_older_measurements_get_by_losses(tmp_path, measurements, periods):
+    """Mean and two standard deviations of the number of missing ones, drawn from their distribution."""
+    read = loaded(tmp_path, f"{{control_rate: 200, measurements: {measurements}}}").deployment
+    assert read.held_age == pytest.approx(0.005 * periods)
+    assert read.command_age == pytest.approx(0.005 * (periods + 0.5))
+    missing = read.measurements.loss + (1.0 - read.measurements.loss) * read.measurements.late
+    if missing < 1.0:
+        drawn = np.random.default_rng(0).geometric(1.0 - missing, 200_000) - 1
+        assert periods == pytest.approx(drawn.mean() + 2.0 * drawn.std(), abs=0.02)
+
+
+SCENARIO = MODELS / "base.scenario.yaml"
+
+
+@pytest.mark.parametrize("gains", [ScheduledGains(age_phase=0.5), FixedGains(damping=7.0)])
+def test_what_is_dumped_is_read_back_and_selected(tmp_path, gains):
+    file = tmp_path / "gains.yaml"
+    file.write_text("# a remark\n" + dump_gains("mine", gains))
+    scenario = with_gains(load_scenario(SCENARIO), str(file))
+    assert scenario.selected_gains == "mine"
+    assert scenario.gain_sets["mine"] == gains
+    assert {"scheduled", "table_2"} < set(scenario.gain_sets)
+
+
+def test_the_file_is_a_section_of_a_scenario(tmp_path):
+    text = dump_gains("mine", ScheduledGains(age_phase=0.5))
+    plain = write_scenario(tmp_path / "room.scenario.yaml").read_text()
+    indented = "".join(f"  {line}\n" for line in text.splitlines())
+    (tmp_path / "room.scenario.yaml").write_text(f"{plain}\ngains:\n{indented}")
+    scenario = load_scenario(tmp_path / "room.scenario.yaml")
+    assert scenario.gain_sets[scenario.selected_gains] == ScheduledGains(age_phase=0.5)
+
+
+def test_a_name_selects_and_nothing_changes_without_one():
+    scenario = load_scenario(SCENARIO)
+    assert with_gains(scenario, "table_2").selected_gains == "table_2"
+    assert with_gains(scenario, None) is scenario
+
+
+@pytest.mark.parametrize(
+    ("text", "complaint"),
+    [
+        ("selected: mine\nsets: {mine: !ScheduledGains {age_phase: -1}}", r"gains.yaml: sets.mine.age_phase"),
+        ("selected: other\nsets: {mine: !ScheduledGains {}}", r"gains.yaml: selected: 'other'"),
+        ("selected: mine\nset: {}", r"gains.yaml: set: "),
+        ("[1, 2]", r"gains.yaml: the file"),
+        ("selected: {", r"gains.yaml: line 2, column 1"),
+    ],
+)
+def test_a_file_that_is_wrong_is_refused_with_its_key(tmp_path, text, complaint):
+    (tmp_path / "gains.yaml").write_text(text)
+    with pytest.raises(ScenarioError, match=complaint):
+        with_gains(load_scenario(SCENARIO), str(tmp_path / "gains.yaml"))
+
+
+def test_neither_name_nor_file_is_refused():
+    with pytest.raises(ScenarioError, match="scheduled, table_2, or a file"):
+        with_gains(load_scenario(SCENARIO), "fast")
+
+
+@pytest.mark.parametrize(
+    ("deployment", "age"),
+    [
+        (Deployment(), None),
+        (Deployment(control_rate=1000.0), None),
+        (Deployment(control_rate=200.0, measurements=Measurements(delay=0.012)), 0.0175),
+        (Deployment(control_rate=100.0, actuators=ActuatorLimits(lag=0.02)), 0.025),
+        (Deployment(actuators=ActuatorLimits(lag=0.02)), 0.02),
+    ],
+)
+def test_rules_without_an_age_of_their_own_get_that_of_the_deployment(deployment, age):
+    """Delays are rounded up to whole periods; a team below 15 ms keeps the gains of an ideal one."""
+    scenario = replace(load_scenario(SCENARIO), deployment=deployment)
+    scheduled = scenario.gain_sets["scheduled"]
+    assert scheduled.command_age == (age if age is None else pytest.approx(age))
+    assert replace(scheduled, command_age=None) == ScheduledGains()
+    assert scenario.gain_sets["table_2"] == FixedGains()

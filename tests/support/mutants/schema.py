@@ -11,7 +11,7 @@ from typing import Any
 
 from coop_drake.scenario import Scenario
 from coop_drake.scenario.model import DirectiveEntry
-from tests.support.mutants.mutant import Mutant, Place, at, block, dotted, flow, put, renamed, without
+from tests.support.mutants.mutant import Mutant, Place, at, block, dotted, put, renamed, without
 
 _NUMBERS = {
     "a text": "wide",
