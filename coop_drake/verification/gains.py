@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from math import hypot, sqrt
 
 import numpy as np
@@ -20,7 +20,7 @@ from coop_drake.planning.duration import estimated
 from coop_drake.tree.component_tree import ComponentTree, usual_unit
 from coop_drake.tree.pose import FloatArray
 from coop_drake.verification.checks import Check
-from coop_drake.verification.kinematics import component_stages
+from coop_drake.verification.kinematics import component_stages, levers
 from coop_drake.verification.runs.laws import SHAPES
 
 RELATIVE = 1e-9
@@ -248,19 +248,18 @@ def _bounds(
     tree: ComponentTree, limits: TeamLimits, speed: float, rates: FloatArray, *, turning: bool
 ) -> FloatArray:
     """Largest speeds of all bases [m/s], or their largest turn rates [rad/s], shape (N,)."""
-    bounds = []
-    for component, point in zip(limits.base_components, limits.base_points, strict=True):
-        reach, bound = hypot(*point), 0.0 if turning else speed
-        for stage in component_stages(tree, component):
-            turns, length = stage.kind == "revolute", hypot(*stage.direction)
-            lever = float(turns) if turning else reach if turns else length
-            bound += lever * float(rates[stage.axis]) if lever > 0.0 else 0.0
-            if not turns:
-                joint = tree.joints[stage.axis - 1]
-                reach += length * max(abs(joint.lower), abs(joint.upper))
-            reach += hypot(stage.X_PJ.x, stage.X_PJ.y)
-        bounds.append(bound)
-    return np.array(bounds)
+    slides = np.concatenate((np.zeros(3), np.maximum(np.abs(tree.joint_lower), np.abs(tree.joint_upper))))
+    bounds = np.full(len(limits.base_points), 0.0 if turning else speed)
+    for k, (component, point) in enumerate(zip(limits.base_components, limits.base_points, strict=True)):
+        stages = component_stages(tree, component)
+        each = (
+            [stage.kind == "revolute" for stage in stages]
+            if turning
+            else levers(hypot(*point), stages, slides)
+        )
+        for stage, lever in zip(stages, each, strict=True):
+            bounds[k] += lever * rates[1 + stage.index] if lever > 0.0 else 0.0
+    return bounds
 
 
 def _check_funnels(plan: Plan, rates: FloatArray) -> None:
@@ -310,15 +309,16 @@ def check_limits(plan: Plan, problem: PlanningProblem, gain_set: GainSet) -> lis
             finding = f"is {stated.estimated_time} s; the simulation of this transition takes {seconds} s"
             raise RefusalError(f"transitions[{k}].estimated_time", finding)
     times = np.array([one.estimated_time for one in again.transitions])
-    broken = {(one.limit, one.joint): one for one in _broken(plan, problem, times, accelerations)}
+    found = _broken(plan, problem, times, accelerations)
+    broken = {(worst.limit, worst.joint): (worst, values) for worst, values in found}
     for k, refusal in enumerate(plan.refused_by):
         _check_stated(refusal, broken.get((refusal.limit, refusal.joint)), f"refused_by[{k}]")
     said = {refusal.limit for refusal in plan.refused_by}
     if len(said) < len(plan.refused_by):
         raise RefusalError("refused_by", "names a limit twice")
-    for one in broken.values():
-        if one.limit not in said:
-            raise RefusalError("refused_by", f"does not say that the plan breaks {one.describe()}")
+    for worst, _ in broken.values():
+        if worst.limit not in said:
+            raise RefusalError("refused_by", f"does not say that the plan breaks {worst.describe()}")
     _check_age(plan, gain_set)
     checks = [Check("times are those of a simulation of each transition", len(times))]
     if plan.refused_by:
@@ -326,50 +326,30 @@ def check_limits(plan: Plan, problem: PlanningProblem, gain_set: GainSet) -> lis
     return [*checks, Check("clearances, times and accelerations keep the scenario's limits", len(times))]
 
 
-@dataclass(frozen=True)
-class _Broken:
-    """A limit that is broken.
-
-    Attributes:
-        limit, joint, allowed, unit: As a ``Refusal`` has them.
-        values: What each cell has, shape (cells,).
-        most: What the cell has that breaks it most.
-    """
-
-    limit: str
-    values: FloatArray
-    most: float
-    allowed: float
-    unit: Unit
-    joint: str = ""
-
-    def describe(self) -> str:
-        """Say which limit is broken where, and by how much."""
-        cell = int(np.argmin(np.abs(self.values - self.most)))
-        return Refusal(self.limit, cell, self.most, self.allowed, self.unit, self.joint).describe()
-
-
-def _check_stated(stated: Refusal, own: _Broken | None, where: str) -> None:
+def _check_stated(stated: Refusal, own: tuple[Refusal, FloatArray] | None, where: str) -> None:
     """Refuse a statement about a limit that is kept or not the scenario's, or about another value."""
     if own is None:
         raise RefusalError(where, f"{stated.describe()}: the scenario has no such limit, or it is kept")
-    room = SAME_VALUE * own.most
-    known = stated.cell < len(own.values) and (stated.allowed, stated.unit) == (own.allowed, own.unit)
-    if not (known and max(abs(stated.value - own.most), abs(own.values[stated.cell] - own.most)) <= room):
-        raise RefusalError(where, f"{stated.describe()}: computed again, {own.describe()}")
+    worst, values = own
+    known = stated.cell < len(values) and (stated.allowed, stated.unit) == (worst.allowed, worst.unit)
+    room = SAME_VALUE * worst.value
+    if not (known and max(abs(stated.value - worst.value), abs(values[stated.cell] - worst.value)) <= room):
+        raise RefusalError(where, f"{stated.describe()}: computed again, {worst.describe()}")
 
 
 def _broken(
     plan: Plan, problem: PlanningProblem, times: FloatArray, accelerations: FloatArray
-) -> Iterator[_Broken]:
-    """The limits that a plan breaks."""
+) -> Iterator[tuple[Refusal, FloatArray]]:
+    """The limits that a plan breaks, in the cell that breaks each most, and what all cells have, (cells,)."""
     settings = problem.settings
     least, longest = usual_unit(problem.tree) * settings.min_clearance, settings.max_transition_time
     clear = _clearances(plan, problem, least)
     if clear.min() < least * (1.0 - CLEARANCE_ROUNDING):
-        yield _Broken("planner.min_clearance", clear, float(clear.min()), least, "m")
+        cell = int(clear.argmin())
+        yield Refusal("planner.min_clearance", cell, float(clear[cell]), least, "m"), clear
     if times.max() > longest:
-        yield _Broken("planner.max_transition_time", times, float(times.max()), longest, "s")
+        cell = int(times.argmax())
+        yield Refusal("planner.max_transition_time", cell, float(times[cell]), longest, "s"), times
     for joint, limit in zip(problem.tree.joints, problem.limits.joint_accelerations.tolist(), strict=False):
         peaks = accelerations[:, 1 + joint.index]
         stated = [one.gains.acceleration_limit for one in plan.transitions]
@@ -380,7 +360,9 @@ def _broken(
         values = peaks / PLANNED_SHARE
         unit: Unit = "rad/s^2" if joint.kind == "revolute" else "m/s^2"
         if np.isfinite(limit) and (values.max() >= limit or any(acting)):
-            yield _Broken("limits.joint_accelerations", values, float(values.max()), limit, unit, joint.name)
+            cell = int(values.argmax())
+            name = "limits.joint_accelerations"
+            yield Refusal(name, cell, float(values[cell]), limit, unit, joint.name), values
 
 
 def _clearances(plan: Plan, problem: PlanningProblem, least: float) -> FloatArray:

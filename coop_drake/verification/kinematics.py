@@ -1,38 +1,27 @@
 """The team's convex solids and the joints that move them, and kinematics of the verifier's own.
 
 A stage is one joint that moves a solid; the stages of a component begin with its own joint and end with theta
-of the object. Configurations z = (x, y, theta, q...) of a log have shape (T, 3 + n) [m, rad].
+of the object. Configurations z = (x, y, theta, q...) of a log have shape (T, 3 + n) [m, rad]: the value of a
+joint stands at 3 + its index.
 """
 
 from __future__ import annotations
 
 from collections.abc import Collection
 from dataclasses import dataclass
-from typing import Literal, NamedTuple
+from math import inf
+from typing import NamedTuple
 
 import numpy as np
 
 from coop_drake.tree.component_tree import ComponentTree, TreeJoint
 from coop_drake.tree.pose import FloatArray, PlanarPose
 
+THETA = TreeJoint("theta", "revolute", -1, -1, PlanarPose(), 1.0, (0.0, 0.0), -inf, inf)
+"""The object's angle as the joint by which the floor carries the object: it stands before q in z."""
 
-@dataclass(frozen=True)
-class Stage:
-    """One joint that moves a solid, or theta of the object.
-
-    Attributes:
-        axis: Index into (theta, q...).
-        kind: ``revolute`` (also theta) or ``prismatic``.
-        scale: Factor from the axis value to the motion: the sign of a revolute joint, 1 for a prismatic one.
-        direction: Direction of a prismatic joint in its frame J, shape (2,).
-        X_PJ: Pose of J in the parent component; the identity for theta.
-    """
-
-    axis: int
-    kind: Literal["revolute", "prismatic"]
-    scale: float
-    direction: FloatArray
-    X_PJ: PlanarPose
+Stages = tuple[TreeJoint, ...]
+"""What moves a component: its own joint first, theta last."""
 
 
 @dataclass(frozen=True)
@@ -53,7 +42,7 @@ class Solid:
     body: int
     vertices: FloatArray
     radius: float
-    stages: tuple[Stage, ...]
+    stages: Stages
 
 
 def team_solids(tree: ComponentTree) -> tuple[Solid, ...]:
@@ -67,10 +56,10 @@ def team_solids(tree: ComponentTree) -> tuple[Solid, ...]:
     )
 
 
-def component_stages(tree: ComponentTree, index: int) -> tuple[Stage, ...]:
+def component_stages(tree: ComponentTree, index: int) -> Stages:
     """The stages that move a component: its own joint first, theta last."""
     joints = (tree.components[i].joint for i in tree.ancestors[index])
-    return (*[_stage(joint) for joint in joints if joint is not None], _THETA)
+    return (*[joint for joint in joints if joint is not None], THETA)
 
 
 def checked_pairs(
@@ -95,14 +84,6 @@ def checked_pairs(
     return tuple(pairs)
 
 
-_THETA = Stage(0, "revolute", 1.0, np.zeros(2), PlanarPose())
-
-
-def _stage(joint: TreeJoint) -> Stage:
-    scale = joint.sign if joint.kind == "revolute" else 1.0
-    return Stage(1 + joint.index, joint.kind, scale, np.array(joint.axis), joint.X_PJ)
-
-
 def cross(first: FloatArray, second: FloatArray) -> FloatArray:
     """The component out of the plane of the product of vectors (T, 2), shape (T,)."""
     return first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]
@@ -119,7 +100,7 @@ def turned(vectors: FloatArray, angles: FloatArray) -> FloatArray:
     return np.column_stack((c * vectors[:, 0] - s * vectors[:, 1], s * vectors[:, 0] + c * vectors[:, 1]))
 
 
-def points_in_world(points: FloatArray, stages: tuple[Stage, ...], z: FloatArray) -> FloatArray:
+def points_in_world(points: FloatArray, stages: Stages, z: FloatArray) -> FloatArray:
     """Carry points of one component to W by its stages.
 
     Args:
@@ -132,11 +113,11 @@ def points_in_world(points: FloatArray, stages: tuple[Stage, ...], z: FloatArray
     """
     carried = np.broadcast_to(points, (len(z), *points.shape))
     for stage in stages:
-        values = stage.scale * z[:, 2 + stage.axis]
+        values = z[:, 3 + stage.index]
         if stage.kind == "prismatic":
-            carried = carried + values[:, None, None] * stage.direction
+            carried = carried + values[:, None, None] * np.array(stage.axis)
         else:
-            c, s = np.cos(values)[:, None], np.sin(values)[:, None]
+            c, s = np.cos(stage.sign * values)[:, None], np.sin(stage.sign * values)[:, None]
             x, y = carried[..., 0], carried[..., 1]
             carried = np.stack((c * x - s * y, s * x + c * y), axis=-1)
         carried = stage.X_PJ.apply(carried)
@@ -144,23 +125,23 @@ def points_in_world(points: FloatArray, stages: tuple[Stage, ...], z: FloatArray
     return placed
 
 
-def turns(stages: tuple[Stage, ...], z: FloatArray) -> FloatArray:
+def turns(stages: Stages, z: FloatArray) -> FloatArray:
     """Angles of one component in W, not wrapped, shape (T,) [rad]; arguments as above."""
     angles = np.zeros(len(z))
     for stage in stages:
         angles += stage.X_PJ.angle
         if stage.kind == "revolute":
-            angles += stage.scale * z[:, 2 + stage.axis]
+            angles += stage.sign * z[:, 3 + stage.index]
     return angles
 
 
-def levers(reach: float, stages: tuple[Stage, ...], z: FloatArray) -> FloatArray:
+def levers(reach: float, stages: Stages, most: FloatArray) -> FloatArray:
     """Bound how far a point of a component moves for each unit of every stage, at all configurations.
 
     Args:
         reach: Largest distance of the component's points from its frame's origin [m].
         stages: The stages that count: its own joint first.
-        z: Configurations of the log, which bound how far joints slide, shape (T, 3 + n) [m, rad].
+        most: Largest magnitudes of z, which bound how far joints slide, shape (3 + n,) [m, rad].
 
     Returns:
         One bound for each stage, shape (stages,) [m for each rad, or m for each m].
@@ -168,9 +149,9 @@ def levers(reach: float, stages: tuple[Stage, ...], z: FloatArray) -> FloatArray
     bounds = []
     for stage in stages:
         if stage.kind == "prismatic":
-            slide = float(np.hypot(*stage.direction))
+            slide = float(np.hypot(*stage.axis))
             bounds.append(slide)
-            reach += slide * float(np.abs(z[:, 2 + stage.axis]).max())
+            reach += slide * float(most[3 + stage.index])
         else:
             bounds.append(reach)
         reach += float(np.hypot(stage.X_PJ.x, stage.X_PJ.y))
@@ -196,16 +177,17 @@ class Motion(NamedTuple):
 
 
 def moved(
-    point: FloatArray, stages: tuple[Stage, ...], z: FloatArray, rates: FloatArray, accelerations: FloatArray
+    point: FloatArray, stages: Stages, z: FloatArray, rates: FloatArray, accelerations: FloatArray
 ) -> Motion:
     """Carry a point of a component, shape (2,) [m], with its derivatives through its stages."""
     count = len(z)
     x, v, a = np.tile(point, (count, 1)), np.zeros((count, 2)), np.zeros((count, 2))
     spin, turning = np.zeros(count), np.zeros(count)
     for stage in stages:
-        q, rate, second = (stage.scale * values[:, 2 + stage.axis] for values in (z, rates, accelerations))
+        scale = stage.sign if stage.kind == "revolute" else 1.0
+        q, rate, second = (scale * values[:, 3 + stage.index] for values in (z, rates, accelerations))
         if stage.kind == "prismatic":
-            x, v, a = (old + new[:, None] * stage.direction for old, new in ((x, q), (v, rate), (a, second)))
+            x, v, a = (old + new[:, None] * stage.axis for old, new in ((x, q), (v, rate), (a, second)))
         else:
             x, v, a = (turned(old, q) for old in (x, v, a))
             w = rate[:, None]

@@ -11,7 +11,6 @@ from coop_drake.scenario import ActuatorLimits, Deployment, Measurements, Messag
 from coop_drake.simulation import build_maps, simulate
 from coop_drake.verification.runs import Rows, verify_log
 from coop_drake.verification.runs.budget import check_nominal_reports
-from tests.support.run_oracle import RunOracle
 from tests.support.small_loop import small_maps, small_problem
 from tests.support.tubes import WITH_AXES, tubed_problem
 
@@ -26,6 +25,9 @@ ADVICE = (
 STATES = {"times", "object_pose", "joints", "base_poses", "accelerations", "base_wrenches", "joint_torques"}
 """Arrays of which no altered number is accepted."""
 
+CLOSE = 2e-6
+"""Of other arrays of an ideal team's log, alterations that are accepted are smaller [-, m, rad, N]."""
+
 ALTERATIONS = 6
 """Alterations of every array."""
 
@@ -35,7 +37,7 @@ def case():
     """A short run of an ideal team, and all that it is checked against."""
     scenario, plan = small_problem("base")
     log = simulate(scenario, plan, small_maps())
-    return log, (plan, planning_problem(scenario), run_setup(scenario)), RunOracle(scenario, plan)
+    return log, (plan, planning_problem(scenario), run_setup(scenario))
 
 
 def arrays(log):
@@ -65,26 +67,22 @@ def refused(log, against, braked=False):
 
 
 def test_a_run_is_accepted_as_it_was(case):
-    log, against, oracle = case
+    log, against = case
     verified = verify_log(log, *against)
     assert (verified.answer, len(verified.checks)) == ("arrived", 22)
-    assert [name for row in range(0, len(log.times), 20) for name in oracle.false_at(log, row)] == []
 
 
-def test_an_altered_number_is_refused_or_makes_nothing_false(case):
-    log, against, oracle = case
+def test_an_altered_number_is_refused_unless_it_is_the_same_up_to_rounding(case):
+    log, against = case
     generator = np.random.default_rng(13)
-    accepted = set()
     for name in arrays(log):
         for _ in range(ALTERATIONS):
             other, row = altered(log, name, generator)
-            error = refused(other, against)
+            error, away = refused(other, against), np.abs(getattr(other, name)[row] - getattr(log, name)[row])
             if error is None:
-                accepted.add(name)
-                assert oracle.false_at(other, row) == [], (name, row)
+                assert away.max() <= (0.0 if name in STATES else CLOSE), (name, row)
             else:
                 assert "t = " in error.finding or "[" in error.where, name
-    assert accepted.isdisjoint(STATES)
 
 
 @pytest.fixture(scope="module")
@@ -105,7 +103,7 @@ def budgeted():
 @pytest.fixture(params=["deployed", "loose", "braked", "budget"])
 def claimed(request, case, budgeted):
     """Logs, what they are checked against, and whether all drives braked."""
-    log, (plan, problem, setup), _ = case
+    log, (plan, problem, setup) = case
     if request.param == "budget":
         return *budgeted, False
     loose = LOOSE if request.param == "loose" else {"exact": False}
@@ -130,7 +128,7 @@ def test_every_array_of_a_log_is_compared_with_something_or_named_as_read(claime
 
 def test_what_is_named_as_read_from_a_log(case, budgeted):
     """Of an ideal team's log all is compared, of others less."""
-    log, (plan, problem, setup), _ = case
+    log, (plan, problem, setup) = case
     said = [verify_log(log, plan, problem, replace(setup, exact=exact)).not_proved for exact in (True, False)]
     assert "as they are logged" not in said[0]
     for name in ("energy_margin", "ready_margins", "governor_position", "commanded_wrenches"):
@@ -162,19 +160,19 @@ def test_a_report_that_the_nominal_motions_do_not_give_is_refused(budgeted):
     ],
 )
 def test_other_entries_are_refused_by_name(case, change, where):
-    log, against, _ = case
+    log, against = case
     assert refused(replace(log, **change), against).where == where
 
 
 def test_a_log_with_too_few_rows_is_refused_as_too_sparse(case):
-    log, against, _ = case
+    log, against = case
     kept = np.unique(np.concatenate([np.arange(0, len(log.times), 8), *entries(log), [len(log.times) - 1]]))
     thinned = replace(log, **{name: getattr(log, name)[kept] for name in arrays(log)})
     assert "the log is too sparse" in refused(thinned, against).finding
 
 
 def test_distances_between_rows_are_bounded_closely(case):
-    log, (plan, problem, setup), _ = case
+    log, (plan, problem, setup) = case
     between = verify_log(log, plan, problem, setup).checks[-1].tightest
     gap = min(log.workspace_clearance.min(), log.body_clearance.min())
     assert 0.9 * gap < between <= gap

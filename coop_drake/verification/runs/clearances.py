@@ -18,11 +18,11 @@ from shapely.geometry.base import BaseGeometry
 
 from coop_drake.answers.problem import PlanningProblem
 from coop_drake.progress import Progress
+from coop_drake.tree.component_tree import TreeJoint
 from coop_drake.tree.pose import FloatArray
 from coop_drake.verification.checks import Check
 from coop_drake.verification.kinematics import (
     Solid,
-    Stage,
     checked_pairs,
     levers,
     points_in_world,
@@ -56,7 +56,7 @@ class _Distance:
     name: str
     array: str
     measure: Callable[[FloatArray], FloatArray]
-    stages: tuple[tuple[Stage, float], ...]
+    stages: tuple[tuple[TreeJoint, float], ...]
     moves: bool
 
     def travel(self, amounts: FloatArray) -> FloatArray:
@@ -64,7 +64,7 @@ class _Distance:
         amounts = np.abs(amounts)
         total = np.hypot(amounts[:, 0], amounts[:, 1]) if self.moves else np.zeros(len(amounts))
         for stage, lever in self.stages:
-            total = total + lever * amounts[:, 2 + stage.axis]
+            total = total + lever * amounts[:, 3 + stage.index]
         return total
 
 
@@ -89,7 +89,7 @@ def check_clearances(
     for name, expected in smallest.items():
         rows.require_same(name, expected, ROUNDING)
     least_logged = float(min(values.min() for values in smallest.values()))
-    count, between_rows = len(distances), "nor did one between two rows"
+    count = len(distances)
     return (
         Check(
             "no body met a wall or another body",
@@ -98,7 +98,7 @@ def check_clearances(
             "m, smallest",
             tuple(smallest),
         ),
-        Check(between_rows, count * len(rows.steps), least, "m, a lower bound"),
+        Check("nor did one between two rows", count * len(rows.steps), least, "m, a lower bound"),
     )
 
 
@@ -138,28 +138,28 @@ def _least_between(rows: Rows, between: Between, distance: _Distance, gaps: Floa
 def _distances(problem: PlanningProblem, z: FloatArray) -> list[_Distance]:
     """All distances that must stay positive: of every solid to the walls, and of pairs of solids."""
     tree, floor = problem.tree, problem.workspace
-    solids, walls = team_solids(tree), floor.boundary
+    solids, walls, most = team_solids(tree), floor.boundary, np.abs(z).max(axis=0)
     distances = [
         _Distance(
             f"{solid.name} and a wall",
             "workspace_clearance",
             partial(_wall_gaps, solid, floor, walls),
-            _moved_by(solid, len(solid.stages), z),
+            _moved_by(solid, len(solid.stages), most),
             moves=True,
         )
         for solid in solids
     ]
     for first, second, *counts in checked_pairs(tree, solids):
-        stages = (*_moved_by(first, counts[0], z), *_moved_by(second, counts[1], z))
+        stages = (*_moved_by(first, counts[0], most), *_moved_by(second, counts[1], most))
         name, measure = f"{first.name} and {second.name}", partial(_gaps, first, second)
         distances.append(_Distance(name, "body_clearance", measure, stages, moves=False))
     return distances
 
 
-def _moved_by(solid: Solid, count: int, z: FloatArray) -> tuple[tuple[Stage, float], ...]:
+def _moved_by(solid: Solid, count: int, most: FloatArray) -> tuple[tuple[TreeJoint, float], ...]:
     stages = solid.stages[:count]
     reach = float(np.hypot(*solid.vertices.T).max()) + solid.radius
-    return tuple(zip(stages, levers(reach, stages, z).tolist(), strict=True))
+    return tuple(zip(stages, levers(reach, stages, most).tolist(), strict=True))
 
 
 def _shapes(solid: Solid, z: FloatArray) -> NDArray[np.object_]:

@@ -11,7 +11,7 @@ from coop_drake.tree.component_tree import ComponentTree, TreeJoint
 from coop_drake.tree.pose import FloatArray
 from coop_drake.verification.checks import Check
 from coop_drake.verification.kinematics import (
-    Stage,
+    Stages,
     component_stages,
     cross,
     moved,
@@ -88,7 +88,7 @@ def about_object(rows: Rows, setup: RunSetup, wrenches: FloatArray, centre: Floa
     return moved
 
 
-def _offset(rows: Rows, stages: tuple[Stage, ...], robot: int) -> FloatArray:
+def _offset(rows: Rows, stages: Stages, robot: int) -> FloatArray:
     """By how much a base's pose on a component differs from the typical one, shape (T,) [m, rad]."""
     angle = turns(stages, rows.z)
     origin = points_in_world(np.zeros((1, 2)), stages, rows.z)[:, 0]
