@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import NamedTuple
 
 import networkx as nx
 import numpy as np
@@ -15,19 +16,8 @@ from matplotlib.path import Path
 from pydrake.systems.framework import Diagram, InputPortIndex, OutputPortIndex, System
 
 from coop_drake.diagram import TELEMETRY, ClosedLoop
+from coop_drake.drawing import colours
 from coop_drake.drawing.canvas import house_style, new_figure
-from coop_drake.drawing.colours import (
-    BLOCK_OF_DIAGRAM,
-    BLUE,
-    GREEN,
-    GREY,
-    INK,
-    ORANGE,
-    PAPER,
-    PURPLE,
-    SKY,
-    VERMILLION,
-)
 
 # The blocks of a Diagram and the signals that join them, as plain data.
 
@@ -35,8 +25,7 @@ INPUTS, OUTPUTS = "from outside", "to outside"
 """Names of the blocks that stand for a Diagram's own ports."""
 
 
-@dataclass(frozen=True)
-class DiagramBlock:
+class DiagramBlock(NamedTuple):
     """One block.
 
     Attributes:
@@ -54,8 +43,7 @@ class DiagramBlock:
     column: int
 
 
-@dataclass(frozen=True)
-class Signal:
+class Signal(NamedTuple):
     """One connection, from an output port of a block to an input port of another."""
 
     source: str
@@ -138,16 +126,11 @@ def _columns(signals: list[Signal], systems: dict[str, System]) -> list[tuple[st
 
     A signal that its block computes from a state alone does not count: it closes a loop.
     """
-    held = {
-        (block, port)
-        for block, system in systems.items()
-        for k, port in enumerate(_outputs(system))
-        if not system.HasDirectFeedthrough(k)
-    }
     graph: nx.DiGraph[str] = nx.DiGraph()
     for signal in signals:
         graph.add_nodes_from((signal.source, signal.sink))
-        if (signal.source, signal.output) not in held:
+        system = systems.get(signal.source)
+        if system is None or system.HasDirectFeedthrough(_outputs(system).index(signal.output)):
             graph.add_edge(signal.source, signal.sink)
     generations = enumerate(nx.topological_generations(graph))
     return [(block, column) for column, members in generations for block in sorted(members)]
@@ -164,21 +147,10 @@ _NAME, _CAPTION = 0.5, 0.4
 _PAGE = (11.0, 7.6)
 """Width and height of what fits on a page of A4 or letter paper, turned sideways [in]."""
 
-_COLOURS = (BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY)
+_COLOURS = (
+    colours.BLUE, colours.VERMILLION, colours.GREEN, colours.PURPLE, colours.ORANGE, colours.SKY,
+)  # fmt: skip
 Point = tuple[float, float]
-
-
-@dataclass(frozen=True)
-class _Place:
-    """Where a block is drawn: its left edge, its top and its height [in]."""
-
-    x: float
-    y: float
-    height: float
-
-    def port(self, row: int) -> float:
-        """Return the height of the middle of a port's row, inputs first, outputs below them [in]."""
-        return self.y - _TITLE - _ROW * (row + 0.5)
 
 
 def block_diagram_figure(loop: ClosedLoop, robot: int = 0) -> Figure:
@@ -189,185 +161,154 @@ def block_diagram_figure(loop: ClosedLoop, robot: int = 0) -> Figure:
     """
     if not 0 <= robot < len(loop.bare_controllers):
         raise IndexError(f"robot {robot} is not in the team of {len(loop.bare_controllers)}")
-    flows = (
-        signal_flow(loop.diagram, "Closed loop: between robots only ready reports cross"),
-        signal_flow(
-            loop.bare_controllers[robot], f"Controller of robot {robot}", telemetry=frozenset(TELEMETRY)
-        ),
+    controller, telemetry = loop.bare_controllers[robot], frozenset(TELEMETRY)
+    drawings = (
+        _Drawing(signal_flow(loop.diagram, "Closed loop: between robots only ready reports cross")),
+        _Drawing(signal_flow(controller, f"Controller of robot {robot}", telemetry=telemetry)),
     )
-    places = [_places(flow) for flow in flows]
-    extents = [_extent(flow, found) for flow, found in zip(flows, places, strict=True)]
-    width = max(right - left for left, right, _, _ in extents)
-    height = _CAPTION + sum(top - bottom for _, _, bottom, top in extents)
+    width = max(one.right - one.left for one in drawings)
+    height = _CAPTION + sum(_NAME - one.bottom for one in drawings)
     scale = min(1.0, _PAGE[0] / width, _PAGE[1] / height)
     caption = "Blocks as they are wired in Drake, inputs at the left, outputs at the right of each."
     with house_style():
         figure = new_figure(scale * width, scale * height, caption, margins=(0.0, 0.0, 0.0))
         above = height
-        for flow, found, (left, right, bottom, top) in zip(flows, places, extents, strict=True):
-            above -= top - bottom
-            rectangle = (0.0, above / height, (right - left) / width, (top - bottom) / height)
-            ax = figure.add_axes(rectangle, xlim=(left, right), ylim=(bottom, top))
-            _draw(ax, flow, found, scale)
+        for one in drawings:
+            above -= _NAME - one.bottom
+            place = 0.0, above / height, (one.right - one.left) / width, (_NAME - one.bottom) / height
+            ax = figure.add_axes(place, xlim=(one.left, one.right), ylim=(one.bottom, _NAME))
+            one.draw(ax, scale)
     return figure
 
 
-def _places(flow: SignalFlow) -> dict[str, _Place]:
-    """Place blocks, and wires that pass a column, in columns; in each, in the order of what feeds them."""
-    places: dict[str, _Place] = {}
-    wires = _wires(flow)
-    columns = range(1 + max(block.column for block in flow.blocks))
-    heights = {block.name: _height(block) for block in flow.blocks} | dict.fromkeys(wires, 0.0)
-    members = [
-        [block.name for block in flow.blocks if block.column == column]
-        + [wire for wire, (at, _) in wires.items() if at == column]
-        for column in columns
-    ]
-    tallest = max(_stack(names, heights) for names in members)
-    for column in columns:
-        feeding = {name: _fed_from(name, flow, wires, places) for name in members[column]}
-        names = sorted(members[column], key=lambda name: (-feeding[name], name))
-        y = -0.5 * (tallest - _stack(names, heights))
-        for name in names:
-            places[name] = _Place(column * (_WIDTH + _GAP), y, heights[name])
-            y -= heights[name] + _SPACE
-    return places
+class _Drawing:
+    """Where the blocks of a Diagram are drawn, and the wires of signals that pass columns between them.
 
+    Attributes:
+        left: Left end of all that is drawn [in].
+        right: Right end [in].
+        bottom: Lower end [in]; the upper one is that of the Diagram's name.
+    """
 
-def _wires(flow: SignalFlow) -> dict[str, tuple[int, Signal]]:
-    """Return the wires that pass columns between their blocks: names, the column and one such signal."""
-    columns = {block.name: block.column for block in flow.blocks}
-    return {
-        _wire(signal, column): (column, signal)
-        for signal in flow.signals
-        for column in range(columns[signal.source] + 1, columns[signal.sink])
-    }
+    def __init__(self, flow: SignalFlow) -> None:
+        self._flow, self._blocks = flow, {block.name: block for block in flow.blocks}
+        self._wires = {
+            _wire(signal, column): (column, signal)
+            for signal in flow.signals
+            for column in range(self._blocks[signal.source].column + 1, self._blocks[signal.sink].column)
+        }
+        self._heights = dict.fromkeys(self._wires, 0.0) | {
+            block.name: _TITLE + _ROW * max(len(block.inputs) + len(block.outputs), 1) + 0.1
+            for block in flow.blocks
+        }
+        self._places: dict[str, Point] = {}  # Left edges and tops, also of wires.
+        self._place()
+        sources = ((s.source, s.output) for s in flow.signals if self._goes_back(s))
+        self._lanes = sorted(set(sources))  # Of signals that go back to the left, below all blocks.
+        aside = 0.2 + 0.1 * len(self._lanes)
+        self._lowest = min(y - self._heights[name] for name, (_, y) in self._places.items())
+        self.left, self.right = -aside, max(x for x, _ in self._places.values()) + _WIDTH + aside
+        self.bottom = self._lowest - 0.35 - 0.14 * len(self._lanes)
+
+    def _place(self) -> None:
+        """Place blocks, and wires, in columns; in each, in the order of what feeds them."""
+        columns = [
+            [block.name for block in self._flow.blocks if block.column == column]
+            + [wire for wire, (at, _) in self._wires.items() if at == column]
+            for column in range(1 + max(block.column for block in self._flow.blocks))
+        ]
+        stacks = [sum(self._heights[name] + _SPACE for name in names) - _SPACE for names in columns]
+        for column, names in enumerate(columns):
+            feeding = {name: self._fed_from(name) for name in names}
+            y = -0.5 * (max(stacks) - stacks[column])
+            for name in sorted(names, key=lambda name: (-feeding[name], name)):
+                self._places[name] = column * (_WIDTH + _GAP), y
+                y -= self._heights[name] + _SPACE
+
+    def _fed_from(self, name: str) -> float:
+        """Return the mean height of the ports and wires already placed that feed a block or a wire [in]."""
+        signals = [s for s in self._flow.signals if s.sink == name and s.source in self._places]
+        if name in self._wires:
+            column, signal = self._wires[name]
+            signals = [signal]
+        else:
+            column = self._blocks[name].column
+        before = [self._places.get(_wire(s, column - 1)) or self._start(s) for s in signals]
+        return float(np.mean([y for _, y in before])) if before else 0.0
+
+    def _port(self, name: str, row: int) -> float:
+        """Return the height of the middle of a port's row, inputs first, outputs below them [in]."""
+        return self._places[name][1] - _TITLE - _ROW * (row + 0.5)
+
+    def _start(self, signal: Signal) -> Point:
+        block = self._blocks[signal.source]
+        row = len(block.inputs) + block.outputs.index(signal.output)
+        return self._places[block.name][0] + _WIDTH, self._port(block.name, row)
+
+    def _end(self, signal: Signal) -> Point:
+        block = self._blocks[signal.sink]
+        row = block.inputs.index(signal.input)
+        return self._places[block.name][0] - 0.03, self._port(block.name, row)
+
+    def _goes_back(self, signal: Signal) -> bool:
+        return self._places[signal.sink][0] <= self._places[signal.source][0]
+
+    def draw(self, ax: Axes, scale: float) -> None:
+        """Draw the Diagram, all texts and marks scaled."""
+        ax.axis("off")
+        ax.text(0.0, _NAME - 0.2, self._flow.name, fontsize=11 * scale, color=colours.INK)
+        sources = list(dict.fromkeys((s.source, s.output) for s in self._flow.signals))
+        for signal in self._flow.signals:
+            colour = _COLOURS[sources.index((signal.source, signal.output)) % len(_COLOURS)]
+            path, end = self._path(signal), self._end(signal)
+            ax.add_patch(PathPatch(path, facecolor="none", edgecolor=colour, linewidth=1.2, alpha=0.85))
+            ax.plot(*end, marker=">", color=colour, markersize=4 * scale)
+        for block in self._flow.blocks:
+            self._draw_block(ax, block, scale)
+
+    def _path(self, signal: Signal) -> Path:
+        """Return a curve through the wires, or a way out, down to a lane, back to the left and up again."""
+        start, end = self._start(signal), self._end(signal)
+        if self._goes_back(signal):
+            lane = self._lanes.index((signal.source, signal.output))
+            y, out = self._lowest - 0.3 - 0.14 * lane, 0.15 + 0.1 * lane
+            right, left = start[0] + out, end[0] - out
+            return Path([start, (right, start[1]), (right, y), (left, y), (left, end[1]), end])
+        columns = range(self._blocks[signal.source].column + 1, self._blocks[signal.sink].column)
+        wires = [self._places[_wire(signal, column)] for column in columns]
+        points = [start, *((x + along, y) for x, y in wires for along in (0.0, _WIDTH)), end]
+        vertices, codes = [start], [Path.MOVETO]
+        for one, other in pairwise(points):  # Horizontal at each.
+            middle = 0.5 * (one[0] + other[0])
+            vertices += [(middle, one[1]), (middle, other[1]), other]
+            codes += [Path.CURVE4] * 3
+        return Path(vertices, codes)
+
+    def _draw_block(self, ax: Axes, block: DiagramBlock, scale: float) -> None:
+        (x, y), height = self._places[block.name], self._heights[block.name]
+        outside = block.name in (INPUTS, OUTPUTS)
+        ax.add_patch(
+            FancyBboxPatch(
+                (x, y - height),
+                _WIDTH,
+                height,
+                boxstyle="round,pad=0,rounding_size=0.08",
+                facecolor=colours.PAPER if outside else colours.BLOCK_OF_DIAGRAM,
+                edgecolor=colours.GREY if outside else colours.INK,
+                linestyle="dashed" if outside else "solid",
+                linewidth=1.0,
+                zorder=3,
+            )
+        )
+        middle, common = x + 0.5 * _WIDTH, {"va": "center", "zorder": 4}
+        name, small = block.name.replace("_", " "), 6.5 * scale
+        ax.text(middle, y - 0.15, name, ha="center", weight="bold", fontsize=7.0 * scale, **common)
+        ax.text(middle, y - 0.32, block.kind, ha="center", fontsize=small, color=colours.GREY, **common)
+        for row, port in enumerate((*block.inputs, *block.outputs)):
+            entry = row < len(block.inputs)
+            at, aligned = (x + 0.06, "left") if entry else (x + _WIDTH - 0.06, "right")
+            ax.text(at, self._port(block.name, row), port, ha=aligned, fontsize=small, **common)
 
 
 def _wire(signal: Signal, column: int) -> str:
     return f"{signal.source}.{signal.output} at {column}"
-
-
-def _height(block: DiagramBlock) -> float:
-    return _TITLE + _ROW * max(len(block.inputs) + len(block.outputs), 1) + 0.1
-
-
-def _output_row(block: DiagramBlock, port: str) -> int:
-    return len(block.inputs) + block.outputs.index(port)
-
-
-def _stack(names: list[str], heights: dict[str, float]) -> float:
-    return sum(heights[name] + _SPACE for name in names) - _SPACE
-
-
-def _fed_from(
-    name: str, flow: SignalFlow, wires: dict[str, tuple[int, Signal]], places: dict[str, _Place]
-) -> float:
-    """Return the mean height of the ports and wires already placed that feed a block or a wire [in]."""
-    column, signal = wires.get(name, (0, None))
-    feeding = [signal] if signal else [s for s in flow.signals if s.sink == name and s.source in places]
-    blocks = {block.name: block for block in flow.blocks}
-    heights = []
-    for s in feeding:
-        before = _wire(s, (column or blocks[name].column) - 1)
-        port = places[s.source].port(_output_row(blocks[s.source], s.output))
-        heights.append(places[before].y if before in places else port)
-    return float(np.mean(heights)) if heights else 0.0
-
-
-def _extent(flow: SignalFlow, places: dict[str, _Place]) -> tuple[float, float, float, float]:
-    """Return left, right, lower and upper end of all that is drawn of a Diagram, its name above it [in]."""
-    lanes = len(_lanes(flow, places))
-    aside = 0.2 + 0.1 * lanes
-    right = max(place.x for place in places.values()) + _WIDTH
-    bottom = min(place.y - place.height for place in places.values())
-    return -aside, right + aside, bottom - 0.35 - 0.14 * lanes, _NAME
-
-
-def _lanes(flow: SignalFlow, places: dict[str, _Place]) -> list[tuple[str, str]]:
-    """Return the sources and outputs of all signals that go back to the left."""
-    return sorted({(s.source, s.output) for s in flow.signals if _goes_back(s, places)})
-
-
-def _goes_back(signal: Signal, places: dict[str, _Place]) -> bool:
-    return places[signal.sink].x <= places[signal.source].x
-
-
-def _draw(ax: Axes, flow: SignalFlow, places: dict[str, _Place], scale: float) -> None:
-    """Draw a Diagram, all texts and marks scaled."""
-    lanes, lowest = _lanes(flow, places), min(place.y - place.height for place in places.values())
-    ax.axis("off")
-    ax.text(0.0, _NAME - 0.2, flow.name, fontsize=11 * scale, color=INK)
-    blocks = {block.name: block for block in flow.blocks}
-    sources = list(dict.fromkeys((s.source, s.output) for s in flow.signals))
-    for signal in flow.signals:
-        start, end = _ends(signal, blocks, places)
-        colour = _COLOURS[sources.index((signal.source, signal.output)) % len(_COLOURS)]
-        if _goes_back(signal, places):
-            lane = lanes.index((signal.source, signal.output))
-            path = _round_trip(start, end, lowest - 0.3 - 0.14 * lane, 0.15 + 0.1 * lane)
-        else:
-            path = _curves([start, *_passing(signal, blocks, places), end])
-        ax.add_patch(PathPatch(path, facecolor="none", edgecolor=colour, linewidth=1.2, alpha=0.85))
-        ax.plot(*end, marker=">", color=colour, markersize=4 * scale)
-    for block in flow.blocks:
-        _draw_block(ax, block, places[block.name], scale)
-
-
-def _ends(signal: Signal, blocks: dict[str, DiagramBlock], places: dict[str, _Place]) -> tuple[Point, Point]:
-    source, sink = places[signal.source], places[signal.sink]
-    output = _output_row(blocks[signal.source], signal.output)
-    entry = blocks[signal.sink].inputs.index(signal.input)
-    return (source.x + _WIDTH, source.port(output)), (sink.x - 0.03, sink.port(entry))
-
-
-def _passing(signal: Signal, blocks: dict[str, DiagramBlock], places: dict[str, _Place]) -> list[Point]:
-    """Return both ends of the wire in every column that a signal passes [in]."""
-    columns = range(blocks[signal.source].column + 1, blocks[signal.sink].column)
-    wires = [places[_wire(signal, column)] for column in columns]
-    return [(wire.x + along, wire.y) for wire in wires for along in (0.0, _WIDTH)]
-
-
-def _curves(points: list[Point]) -> Path:
-    """Return a smooth curve from point to point, horizontal at each."""
-    vertices, codes = [points[0]], [Path.MOVETO]
-    for start, end in pairwise(points):
-        middle = 0.5 * (start[0] + end[0])
-        vertices += [(middle, start[1]), (middle, end[1]), end]
-        codes += [Path.CURVE4] * 3
-    return Path(vertices, codes)
-
-
-def _round_trip(start: Point, end: Point, lane: float, out: float) -> Path:
-    """Return a path out to the right, down to a lane below all blocks, back to the left and up again."""
-    right, left = start[0] + out, end[0] - out
-    return Path([start, (right, start[1]), (right, lane), (left, lane), (left, end[1]), end])
-
-
-def _draw_block(ax: Axes, block: DiagramBlock, place: _Place, scale: float) -> None:
-    outside = block.name in (INPUTS, OUTPUTS)
-    ax.add_patch(
-        FancyBboxPatch(
-            (place.x, place.y - place.height),
-            _WIDTH,
-            place.height,
-            boxstyle="round,pad=0,rounding_size=0.08",
-            facecolor=PAPER if outside else BLOCK_OF_DIAGRAM,
-            edgecolor=GREY if outside else INK,
-            linestyle="dashed" if outside else "solid",
-            linewidth=1.0,
-            zorder=3,
-        )
-    )
-    middle = place.x + 0.5 * _WIDTH
-    ax.text(middle, place.y - 0.15, block.name.replace("_", " "), ha="center", va="center", weight="bold",
-            fontsize=7.0 * scale, zorder=4)  # fmt: skip
-    small = 6.5 * scale
-    ax.text(
-        middle, place.y - 0.32, block.kind, ha="center", va="center", fontsize=small, color=GREY, zorder=4
-    )
-    for row, port in enumerate(block.inputs):
-        ax.text(place.x + 0.06, place.port(row), port, ha="left", va="center", fontsize=small, zorder=4)
-    for port in block.outputs:
-        x, row = place.x + _WIDTH - 0.06, _output_row(block, port)
-        ax.text(x, place.port(row), port, ha="right", va="center", fontsize=small, zorder=4)
