@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from math import cos, pi, sin
 
 import numpy as np
@@ -225,16 +224,6 @@ def read_component_tree(team: TeamPlant) -> ComponentTree:
     return _TreeReader(team).tree()
 
 
-@dataclass(frozen=True)
-class _Link:
-    """A movable joint with the component that it leads to."""
-
-    joint: Joint
-    bodies: tuple[RigidBody, ...]
-    outwards: bool
-    X_WC: RigidTransform
-
-
 class _TreeReader:
     """Reads the plant from the object outwards, with all positions zero."""
 
@@ -259,13 +248,18 @@ class _TreeReader:
         components = [self._component(root, None, None, RigidTransform())]
         used: set[int] = set()
         for at, (members, X_WP) in enumerate(queue):  # the queue grows in the loop
+            known = {int(body.index()) for body in members}
             for index, joint in enumerate(self.team.joints):
-                link = None if index in used else self._link(joint, members)
-                if link is not None:
+                ends = joint.parent_body(), joint.child_body()
+                inside = [int(end.index()) in known for end in ends]
+                if index not in used and any(inside):
                     used.add(index)
-                    queue.append((link.bodies, link.X_WC))
-                    tree_joint = self._tree_joint(link, index, X_WP)
-                    components.append(self._component(link.bodies, at, tree_joint, link.X_WC))
+                    bodies = self._welded_to(ends[1] if inside[0] else ends[0])
+                    origin = joint.frame_on_parent().CalcPoseInWorld(self.context).translation()
+                    X_WC = RigidTransform(RotationMatrix(), origin)
+                    tree_joint = self._tree_joint(joint, index, X_WP, X_WC, outwards=inside[0])
+                    queue.append((bodies, X_WC))
+                    components.append(self._component(bodies, at, tree_joint, X_WC))
         self._check_solid(components)
         return ComponentTree(tuple(components), self.may_overlap)
 
@@ -295,27 +289,17 @@ class _TreeReader:
             sorted(found.values(), key=lambda b: (self.robot_of.get(int(b.index()), -1), int(b.index())))
         )
 
-    def _link(self, joint: Joint, members: tuple[RigidBody, ...]) -> _Link | None:
-        inside = {int(body.index()) for body in members}
-        parent, child = joint.parent_body(), joint.child_body()
-        if int(parent.index()) in inside:
-            outer, outwards = child, True
-        elif int(child.index()) in inside:
-            outer, outwards = parent, False
-        else:
-            return None
-        origin = joint.frame_on_parent().CalcPoseInWorld(self.context).translation()
-        return _Link(joint, self._welded_to(outer), outwards, RigidTransform(RotationMatrix(), origin))
-
-    def _tree_joint(self, link: _Link, index: int, X_WP: RigidTransform) -> TreeJoint:
-        axis = axis_in_world(link.joint, self.context) * (1.0 if link.outwards else -1.0)
-        lower, upper = limits_of(link.joint)
-        offset = link.X_WC.translation() - X_WP.translation()
-        revolute = link.joint.type_name() == "revolute"
+    def _tree_joint(
+        self, joint: Joint, index: int, X_WP: RigidTransform, X_WC: RigidTransform, *, outwards: bool
+    ) -> TreeJoint:
+        axis = axis_in_world(joint, self.context) * (1.0 if outwards else -1.0)
+        lower, upper = limits_of(joint)
+        offset = X_WC.translation() - X_WP.translation()
+        revolute = joint.type_name() == "revolute"
         return TreeJoint(
-            name=scoped(self.plant, link.joint),
+            name=scoped(self.plant, joint),
             kind="revolute" if revolute else "prismatic",
-            robot=self.robot_of[int(link.joint.child_body().index())],
+            robot=self.robot_of[int(joint.child_body().index())],
             index=index,
             X_PJ=PlanarPose(round(float(offset[0]), DIGITS), round(float(offset[1]), DIGITS), 0.0),
             sign=float(np.sign(axis[2])) if revolute else 1.0,

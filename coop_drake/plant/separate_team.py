@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from pydrake.geometry import CollisionFilterDeclaration, GeometrySet, SceneGraph
@@ -20,8 +21,7 @@ from coop_drake.scenario import Assembly, Scenario
 from coop_drake.tree.pose import FloatArray
 
 
-@dataclass(frozen=True)
-class ConstrainedGrasp:
+class ConstrainedGrasp(NamedTuple):
     """One robot's hold on the object.
 
     Attributes:
@@ -35,25 +35,6 @@ class ConstrainedGrasp:
     object_body: RigidBody
     X_OE: RigidTransform
     base_joint: PlanarJoint
-
-    def constrain(self, plant: MultibodyPlant) -> None:
-        """Add the constraint that welds end effector and object; the plant must not be finalized yet."""
-        gripper = self.gripper_frame
-        plant.AddWeldConstraint(
-            self.object_body, self.X_OE, gripper.body(), gripper.GetFixedPoseInBodyFrame()
-        )
-
-    def error(self, context: Context) -> float:
-        """Distance between Ek on the end effector and on the object [m]."""
-        p_WE = self.gripper_frame.CalcPoseInWorld(context).translation()
-        wanted = self.object_body.EvalPoseInWorld(context).multiply(self.X_OE.translation())
-        return float(np.linalg.norm(p_WE - wanted))
-
-    def lever(self, context: Context) -> FloatArray:
-        """Vector from Bk to Ek in W, shape (2,) [m]."""
-        p_WE = self.gripper_frame.CalcPoseInWorld(context).translation()
-        p_WB = self.base_joint.child_body().EvalPoseInWorld(context).translation()
-        return (p_WE - p_WB)[:2]
 
 
 class ConstrainedGrasps:
@@ -79,7 +60,8 @@ class ConstrainedGrasps:
         needed = self._plant.CalcInverseDynamics(context, acceleration, forces)
         wrenches = self._on_bases(context) - np.array([needed[rows] for rows in self._rows])
         for wrench, grasp in zip(wrenches, self._grasps, strict=True):
-            r = grasp.lever(context)
+            p_WE = grasp.gripper_frame.CalcPoseInWorld(context).translation()
+            r = p_WE - grasp.base_joint.child_body().EvalPoseInWorld(context).translation()
             wrench[2] -= r[0] * wrench[1] - r[1] * wrench[0]
         return wrenches
 
@@ -92,8 +74,10 @@ class ConstrainedGrasps:
         return np.array([(total[3], total[4], total[2]) for total in sums.values()])
 
     def errors(self, context: Context) -> FloatArray:
-        """As in :class:`coop_drake.plant.team.Grasps`."""
-        return np.array([grasp.error(context) for grasp in self._grasps])
+        """As in :class:`coop_drake.plant.team.Grasps`: Ek of the end effector, and on the object."""
+        found = [grasp.gripper_frame.CalcPoseInWorld(context).translation() for grasp in self._grasps]
+        wanted = [g.object_body.EvalPoseInWorld(context).multiply(g.X_OE.translation()) for g in self._grasps]
+        return np.linalg.norm(np.subtract(found, wanted), axis=1)
 
 
 # The team as separate trees: the object and every robot, connected by weld constraints at the grasps.
@@ -170,7 +154,9 @@ def build_separate_team(scenario: Scenario, builder: DiagramBuilder) -> Separate
         _grasp(tree, robot, zero, plant, joint) for robot, joint in zip(tree.robots, base_joints, strict=True)
     ]
     for grasp in grasps:
-        grasp.constrain(plant)
+        gripper = grasp.gripper_frame
+        X_GE = gripper.GetFixedPoseInBodyFrame()
+        plant.AddWeldConstraint(grasp.object_body, grasp.X_OE, gripper.body(), X_GE)
     set_actuators(plant, [joint for _, joints in chains for joint in joints])
     finalize(scenario, plant)
     _let_nothing_touch(scene_graph)

@@ -241,22 +241,33 @@ def build_team_plant(scenario: Scenario, builder: DiagramBuilder) -> TeamPlant:
     Raises:
         ScenarioError: The models do not make a team of holonomic planar manipulators that hold one object.
     """
-    models = _read_team(scenario)
-    assembly = models.assembly
-    plant, scene_graph = add_copy(builder, models.plant, models.scene_graph)
-    frame = plant.get_frame(models.object_frame)
-    context = plant.CreateDefaultContext()
+    assembly, read, geometry, of_frame, of_joint = _read_team(scenario)
+    plant, scene_graph = add_copy(builder, read, geometry)
+    frame, context = plant.get_frame(of_frame), plant.CreateDefaultContext()
     robots: list[RobotModel] = []
     for robot in assembly.robots:
         first = robots[-1].q_slice.stop if robots else 0
         base, joints = find_base(scenario, robot, plant)
-        robots.append(_robot_model(robot, plant, context, frame, base, joints, len(robots), first))
+        gripper = GetScopedFrameByName(plant, robot.gripper_frame)
+        robots.append(
+            RobotModel(
+                index=len(robots),
+                name=robot.name,
+                model_instance=base.model_instance(),
+                base_body=base,
+                joints=joints,
+                joint_names=tuple(scoped(plant, joint) for joint in joints),
+                gripper_frame=gripper,
+                X_LE=planar_pose(gripper.CalcPose(context, frame)),
+                q_slice=slice(first, first + len(joints)),
+            )
+        )
     return TeamPlant(
         plant=plant,
         scene_graph=scene_graph,
         object_body=frame.body(),
         object_frame=frame,
-        object_joint=plant.get_joint(models.object_joint),
+        object_joint=plant.get_joint(of_joint),
         object_inertia=_object_inertia(plant, context, bodies_of(plant, [assembly.object_model]), frame),
         robots=tuple(robots),
         grasps=WeldedGrasps(plant, assembly.robots),
@@ -265,27 +276,11 @@ def build_team_plant(scenario: Scenario, builder: DiagramBuilder) -> TeamPlant:
     )
 
 
-@dataclass(frozen=True)
-class _TeamModels:
-    """What Drake reads from the models of a team.
-
-    Attributes:
-        assembly: The object and the robots in the directives.
-        plant: Finalized and checked, in no diagram.
-        scene_graph: Its geometry.
-        object_frame: L.
-        object_joint: The joint that moves L against the world.
-    """
-
-    assembly: Assembly
-    plant: MultibodyPlant
-    scene_graph: SceneGraph
-    object_frame: FrameIndex
-    object_joint: JointIndex
-
-
 @read_once
-def _read_team(scenario: Scenario) -> _TeamModels:
+def _read_team(
+    scenario: Scenario,
+) -> tuple[Assembly, MultibodyPlant, SceneGraph, FrameIndex, JointIndex]:
+    """Return object and robots, plant and geometry in no diagram, L, and the joint that moves L."""
     assembly = assemble(scenario)
     plant, scene_graph = MultibodyPlant(0.0), SceneGraph()
     plant.set_name("plant")
@@ -300,31 +295,7 @@ def _read_team(scenario: Scenario) -> _TeamModels:
     context = plant.CreateDefaultContext()
     check_planar(scenario, assembly, plant, context, chains)
     check_masses(scenario, assembly, plant, context)
-    return _TeamModels(assembly, plant, scene_graph, frame.index(), object_joint.index())
-
-
-def _robot_model(
-    robot: RobotAssembly,
-    plant: MultibodyPlant,
-    context: Context,
-    object_frame: Frame,
-    base: RigidBody,
-    joints: tuple[Joint, ...],
-    index: int,
-    first: int,
-) -> RobotModel:
-    gripper = GetScopedFrameByName(plant, robot.gripper_frame)
-    return RobotModel(
-        index=index,
-        name=robot.name,
-        model_instance=base.model_instance(),
-        base_body=base,
-        joints=joints,
-        joint_names=tuple(scoped(plant, joint) for joint in joints),
-        gripper_frame=gripper,
-        X_LE=planar_pose(gripper.CalcPose(context, object_frame)),
-        q_slice=slice(first, first + len(joints)),
-    )
+    return assembly, plant, scene_graph, frame.index(), object_joint.index()
 
 
 def _object_inertia(

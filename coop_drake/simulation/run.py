@@ -327,7 +327,7 @@ class Recorder:
             ends: The log's fields from ``reached`` on, which are the same for all steps.
         """
         z, rates = self._column("z"), self._column("rates")
-        known = {field.name for kind in (Sample, Margins) for field in fields(kind)} - set(ends)
+        known = {*Margins._fields, *(field.name for field in fields(Sample))} - set(ends)
         names = [field.name for field in fields(SimulationLog) if field.name in known]
         arrays: dict[str, Any] = {name: self._column(name) for name in names}
         return SimulationLog(

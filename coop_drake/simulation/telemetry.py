@@ -259,46 +259,38 @@ def _narrowest(z: FloatArray, lower: FloatArray, upper: FloatArray) -> tuple[flo
     return least, axis
 
 
-@dataclass(frozen=True)
-class Margins:
-    """Margins of one instant; names and units as in ``SimulationLog``.
+class Margins(NamedTuple):
+    """What ``margins`` returns of one instant, then the others; names and units as in ``SimulationLog``.
 
     Attributes:
         workspace_clearance: Distance of the nearest body to the walls [m].
+        piece: Number of its piece.
         body_clearance: Smallest distance between bodies that must not touch [m].
+        pair: Number of their pair.
         cell_clearance: Signed distance of the object's position to the boundary of its cell [m].
         funnel_margin: Smallest distance of an axis to its funnel [rad or m].
+        funnel_axis: This axis.
         slice_margin: Smallest distance of an axis to its slice [rad or m].
+        slice_axis: This axis.
+        wrench_error: Measured less commanded wrench [N or N m].
         energy_margin: Delta E [m^2/s^2].
         acceleration_error: Realised less commanded acceleration [m/s^2 or rad/s^2].
-        wrench_error: Measured less commanded wrench [N or N m].
         violation: Which invariant is broken, when and by how much; empty if none is.
     """
 
     workspace_clearance: float
+    piece: int
     body_clearance: float
+    pair: int
     cell_clearance: float
     funnel_margin: float
-    slice_margin: float
-    energy_margin: float
-    acceleration_error: float
-    wrench_error: float
-    violation: str
-
-
-class _Measured(NamedTuple):
-    """The values that the compiled ``margins`` returns."""
-
-    wall: float
-    piece: int
-    between: float
-    pair: int
-    in_cell: float
-    funnel: float
     funnel_axis: int
-    slice: float
+    slice_margin: float
     slice_axis: int
     wrench_error: float
+    energy_margin: float
+    acceleration_error: float
+    violation: str = ""
 
 
 class Invariants:
@@ -324,52 +316,39 @@ class Invariants:
             *(sample.z, *self._cells[sample.cell], sample.funnel_lower, sample.funnel_upper),
             *(sample.commanded_wrenches, sample.measured_wrenches),
         )
-        measured = _Measured(*margins(*self._clearance.kernel_arguments, *arguments))
-        broken = [*self._broken(sample, measured)]
-        if self._exact:
-            broken.extend(_inexact(sample, measured.wrench_error))
-        return Margins(
-            workspace_clearance=measured.wall,
-            body_clearance=measured.between,
-            cell_clearance=measured.in_cell,
-            funnel_margin=measured.funnel,
-            slice_margin=measured.slice,
-            energy_margin=sample.energy_margin,
-            acceleration_error=sample.acceleration_error,
-            wrench_error=measured.wrench_error,
-            violation=_described(sample, broken) if broken else "",
-        )
+        measured = margins(*self._clearance.kernel_arguments, *arguments)
+        found = Margins(*measured, sample.energy_margin, sample.acceleration_error)
+        broken = [*self._broken(sample, found), *(_inexact(found) if self._exact else ())]
+        where = f"at t = {sample.time:.6g} s in cell {sample.cell}: "
+        return found._replace(violation=where + "; ".join(broken)) if broken else found
 
-    def _broken(self, sample: Sample, measured: _Measured) -> Iterator[str]:
-        if not measured.wall > 0.0:
-            yield f"clearance between {self._clearance.wall_place(measured.piece)} is {measured.wall:.3g} m"
-        if not measured.between > 0.0:
-            place = self._clearance.pair_place(measured.pair)
-            yield f"clearance between {place} is {measured.between:.3g} m"
-        if not measured.in_cell > 0.0:
+    def _broken(self, sample: Sample, found: Margins) -> Iterator[str]:
+        if not found.workspace_clearance > 0.0:
+            place = self._clearance.wall_place(found.piece)
+            yield f"clearance between {place} is {found.workspace_clearance:.3g} m"
+        if not found.body_clearance > 0.0:
+            place = self._clearance.pair_place(found.pair)
+            yield f"clearance between {place} is {found.body_clearance:.3g} m"
+        if not found.cell_clearance > 0.0:
             where = f"the boundary of cell {sample.cell}"
-            yield f"distance of the object to {where} is {measured.in_cell:.3g} m"
-        if not measured.funnel > 0.0:
-            axis = self._axes[measured.funnel_axis]
-            yield f"distance of {axis} to its funnel is {measured.funnel:.3g} rad or m"
-        if not measured.slice > 0.0:
-            axis = self._axes[measured.slice_axis]
-            yield f"distance of {axis} to its slice is {measured.slice:.3g} rad or m"
+            yield f"distance of the object to {where} is {found.cell_clearance:.3g} m"
+        for margin, axis, kind in (
+            (found.funnel_margin, found.funnel_axis, "funnel"),
+            (found.slice_margin, found.slice_axis, "slice"),
+        ):
+            if not margin > 0.0:
+                yield f"distance of {self._axes[axis]} to its {kind} is {margin:.3g} rad or m"
         if not sample.grasp_error <= GRASP_TOLERANCE:
             yield f"distance of an end effector to its grasp is {sample.grasp_error:.3g} m"
 
 
-def _described(sample: Sample, broken: list[str]) -> str:
-    return f"at t = {sample.time:.6g} s in cell {sample.cell}: {'; '.join(broken)}"
-
-
-def _inexact(sample: Sample, wrench_error: float) -> Iterator[str]:
-    if not sample.energy_margin >= 0.0:
-        yield f"Delta E is {sample.energy_margin:.3g} m^2/s^2"
-    if not sample.acceleration_error <= ACCELERATION_TOLERANCE:
-        yield f"realised less commanded acceleration is {sample.acceleration_error:.3g} m/s^2"
-    if not wrench_error <= WRENCH_TOLERANCE:
-        yield f"measured less commanded grasp wrench is {wrench_error:.3g} N"
+def _inexact(found: Margins) -> Iterator[str]:
+    if not found.energy_margin >= 0.0:
+        yield f"Delta E is {found.energy_margin:.3g} m^2/s^2"
+    if not found.acceleration_error <= ACCELERATION_TOLERANCE:
+        yield f"realised less commanded acceleration is {found.acceleration_error:.3g} m/s^2"
+    if not found.wrench_error <= WRENCH_TOLERANCE:
+        yield f"measured less commanded grasp wrench is {found.wrench_error:.3g} N"
 
 
 # Messages.

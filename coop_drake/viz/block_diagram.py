@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import networkx as nx
 import numpy as np
@@ -300,7 +300,7 @@ class _Drawing:
                 zorder=3,
             )
         )
-        middle, common = x + 0.5 * _WIDTH, {"va": "center", "zorder": 4}
+        middle, common = x + 0.5 * _WIDTH, dict[str, Any](va="center", zorder=4)
         name, small = block.name.replace("_", " "), 6.5 * scale
         ax.text(middle, y - 0.15, name, ha="center", weight="bold", fontsize=7.0 * scale, **common)
         ax.text(middle, y - 0.32, block.kind, ha="center", fontsize=small, color=colours.GREY, **common)
