@@ -9,6 +9,7 @@ from math import inf, nan, sqrt
 
 import numpy as np
 
+from coop_drake.compiled_loop import watching
 from coop_drake.compiled_loop.arrays import (
     LoopDepartures,
     LoopMemory,
@@ -20,39 +21,6 @@ from coop_drake.compiled_loop.arrays import (
 )
 from coop_drake.compiled_loop.loop import run_loop
 from coop_drake.compiled_loop.preparing import CompiledTransport
-from coop_drake.compiled_loop.watching import (
-    ALARM,
-    ARRIVED,
-    ASTRAY,
-    AT_BODY,
-    AT_WALL,
-    BODY,
-    CELL,
-    EFFORT,
-    ENDED,
-    FORCE,
-    FUNNEL,
-    FUNNEL_AXIS,
-    FUNNEL_CELL,
-    HELD,
-    LATE,
-    OUT_OF_FUNNEL,
-    OUT_OF_REGION,
-    OUT_OF_SLICE,
-    PLACE,
-    REGION,
-    ROBOT,
-    SAMPLES,
-    SHARE,
-    SQUARES,
-    STALLED,
-    STEP,
-    TORQUE,
-    TURN,
-    VALUE,
-    WALL,
-    begin_figures,
-)
 from coop_drake.diagram.deployment import (
     clock_shift,
     effort_limits,
@@ -284,7 +252,11 @@ def run(
     departures = departures_of(transport, deployment)
     period, memory = float(departures.times[0]), memory_of(transport, departures)
     memory.state[transport.order] += displacement(deployment, len(transport.order))
-    team, plant, figures = believed(transport.team, deployment.mass_error), transport.plant, begin_figures()
+    team, plant, figures = (
+        believed(transport.team, deployment.mass_error),
+        transport.plant,
+        watching.begin_figures(),
+    )
     run_loop(
         transport.cells,
         team,
@@ -307,48 +279,53 @@ def run_many(transport: CompiledTransport, deployments: Iterable[Deployment]) ->
 
 def _outcome(transport: CompiledTransport, figures: FloatArray, period: float) -> RunOutcome:
     axes = ("angle", *transport.plan.joint_names)
-    arrived = figures[ENDED] == ARRIVED
+    arrived = figures[watching.ENDED] == watching.ARRIVED
     return RunOutcome(
         arrived=bool(arrived),
         reason="" if arrived else _reason(transport, figures, axes, period),
-        time=float(figures[SAMPLES] * period),
-        steps=int(figures[SAMPLES]),
-        cell=int(figures[CELL]),
-        funnel_margin=float(figures[FUNNEL]),
-        funnel_axis=axes[int(figures[FUNNEL_AXIS])],
-        funnel_cell=int(figures[FUNNEL_CELL]),
-        cell_margin=float(figures[REGION]),
-        wall_clearance=float(figures[WALL]),
-        body_clearance=float(figures[BODY]),
-        budget_share=float(figures[SHARE]),
-        alarm_share=float(figures[ALARM]),
-        peak_force=float(figures[FORCE]),
-        peak_torque=float(figures[EFFORT]) if transport.plan.joint_names else nan,
-        peak_base_torque=float(figures[TORQUE]),
-        force_rate=float(figures[STEP]) / period,
-        mean_force=sqrt(figures[SQUARES] / (figures[SAMPLES] + 1.0)),
-        peak_turning=float(figures[TURN]) / period,
+        time=float(figures[watching.SAMPLES] * period),
+        steps=int(figures[watching.SAMPLES]),
+        cell=int(figures[watching.CELL]),
+        funnel_margin=float(figures[watching.FUNNEL]),
+        funnel_axis=axes[int(figures[watching.FUNNEL_AXIS])],
+        funnel_cell=int(figures[watching.FUNNEL_CELL]),
+        cell_margin=float(figures[watching.REGION]),
+        wall_clearance=float(figures[watching.WALL]),
+        body_clearance=float(figures[watching.BODY]),
+        budget_share=float(figures[watching.SHARE]),
+        alarm_share=float(figures[watching.ALARM]),
+        peak_force=float(figures[watching.FORCE]),
+        peak_torque=float(figures[watching.EFFORT]) if transport.plan.joint_names else nan,
+        peak_base_torque=float(figures[watching.TORQUE]),
+        force_rate=float(figures[watching.STEP]) / period,
+        mean_force=sqrt(figures[watching.SQUARES] / (figures[watching.SAMPLES] + 1.0)),
+        peak_turning=float(figures[watching.TURN]) / period,
     )
 
 
 def _reason(transport: CompiledTransport, figures: FloatArray, axes: tuple[str, ...], period: float) -> str:
     """Return why a run ended, as the log of Drake's loop says it."""
-    time, cell, value = figures[SAMPLES] * period, int(figures[CELL]), figures[VALUE]
-    if figures[ENDED] == HELD:
-        k = int(figures[ROBOT])
+    time, cell, value = (
+        figures[watching.SAMPLES] * period,
+        int(figures[watching.CELL]),
+        figures[watching.VALUE],
+    )
+    if figures[watching.ENDED] == watching.HELD:
+        k = int(figures[watching.ROBOT])
         robot, (first, last) = transport.robot_names[k], transport.team.first[2, k : k + 2].tolist()
-        what = departing_name(int(figures[PLACE]), axes[1 + first : 1 + last])
+        what = departing_name(int(figures[watching.PLACE]), axes[1 + first : 1 + last])
         said = f"{robot} asks for a hold: {what} departs {value:.3g} times as far as its level allows"
         return f"at t = {time:.6g} s in cell {cell}: {said}, as {robot} measures it"
-    axis = axes[int(figures[PLACE])]
+    axis = axes[int(figures[watching.PLACE])]
     text = {
-        ASTRAY: f"the team says that it has arrived, {value:.3g} times the tolerance away from the goal",
-        STALLED: f"stalled, {value:.6g} s after its entry",
-        LATE: "no arrival within max_time",
-        OUT_OF_FUNNEL: f"distance of {axis} to its funnel is {value:.3g} rad or m",
-        OUT_OF_SLICE: f"distance of {axis} to its slice is {value:.3g} rad or m",
-        OUT_OF_REGION: f"distance of the object to the boundary of cell {cell} is {value:.3g} m",
-        AT_WALL: f"clearance between a body and the walls is {value:.3g} m",
-        AT_BODY: f"clearance between two bodies is {value:.3g} m",
+        watching.ASTRAY: "the team says that it has arrived, "
+        f"{value:.3g} times the tolerance away from the goal",
+        watching.STALLED: f"stalled, {value:.6g} s after its entry",
+        watching.LATE: "no arrival within max_time",
+        watching.OUT_OF_FUNNEL: f"distance of {axis} to its funnel is {value:.3g} rad or m",
+        watching.OUT_OF_SLICE: f"distance of {axis} to its slice is {value:.3g} rad or m",
+        watching.OUT_OF_REGION: f"distance of the object to the boundary of cell {cell} is {value:.3g} m",
+        watching.AT_WALL: f"clearance between a body and the walls is {value:.3g} m",
+        watching.AT_BODY: f"clearance between two bodies is {value:.3g} m",
     }
-    return f"at t = {time:.6g} s in cell {cell}: {text[int(figures[ENDED])]}"
+    return f"at t = {time:.6g} s in cell {cell}: {text[int(figures[watching.ENDED])]}"

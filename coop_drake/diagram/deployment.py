@@ -7,43 +7,24 @@ from dataclasses import dataclass
 from typing import Any, TypeAlias
 
 import numpy as np
+from pydrake.systems import primitives
 from pydrake.systems.framework import Context, Diagram, DiagramBuilder, InputPort, LeafSystem, OutputPort
-from pydrake.systems.primitives import (
-    AffineSystem,
-    Demultiplexer,
-    DiscreteTimeDelay,
-    FirstOrderLowPassFilter,
-    Gain,
-    Multiplexer,
-    PassThrough,
-    TrajectorySource,
-    ZeroOrderHold,
-)
 from pydrake.trajectories import PiecewisePolynomial
 
+from coop_drake import systems
 from coop_drake.diagram.robot_controller import TELEMETRY
 from coop_drake.laws.measurements import NOTHING, uniform_pair, whole_periods
 from coop_drake.scenario import Deafness, Deployment, Messages, PoseBias, RobotDepartures, Silence
-from coop_drake.systems import (
-    Interruption,
-    LaggingEffort,
-    LimitedEffort,
-    LossyMeasurement,
-    MeasurementNoise,
-    MessageChannel,
-    ShiftedMeasurement,
-    build_selector,
-)
 from coop_drake.tree.pose import FloatArray
 
 
-def build_radio(deployment: Deployment, robot: int, use: int = 0) -> MessageChannel:
+def build_radio(deployment: Deployment, robot: int, use: int = 0) -> systems.MessageChannel:
     """Build the channel of a robot's reports in a sampled team.
 
     The use of the seed is 3 for its requests to the hold supervisor, and 4 for what it hears of this.
     """
     messages = deployment.messages
-    return MessageChannel(
+    return systems.MessageChannel(
         deployment.period or 0.0,
         delay=messages.delay,
         loss=messages.loss,
@@ -65,7 +46,12 @@ def seed_of(deployment: Deployment, robot: int, use: int = 0) -> int:
 # The blocks that a deployment puts between one robot's controller and the rest of the loop.
 
 
-Holding: TypeAlias = DiscreteTimeDelay | ZeroOrderHold | LossyMeasurement | ShiftedMeasurement
+Holding: TypeAlias = (
+    primitives.DiscreteTimeDelay
+    | primitives.ZeroOrderHold
+    | systems.LossyMeasurement
+    | systems.ShiftedMeasurement
+)
 """Blocks that hold measurements."""
 
 NOISE_USES = {"object_pose": 5, "robot_state": 6}
@@ -109,10 +95,14 @@ class Wrapping:
         The time of the measurement goes with it through all that delays or loses it.
         """
         name, size = entry.get_name(), entry.size()
-        joined, parted, sensed = Multiplexer([size, 1]), Demultiplexer([size, 1]), self._sensed(name, size)
+        joined, parted, sensed = (
+            primitives.Multiplexer([size, 1]),
+            primitives.Demultiplexer([size, 1]),
+            self._sensed(name, size),
+        )
         carried = [(f"{name}_stamped", joined), *self._carried(name, 1 + size), (f"{name}_parted", parted)]
         self._lead(entry, sensed + carried)
-        clock = self._builder.AddNamedSystem(f"{name}_clock", TrajectorySource(_CLOCK))
+        clock = self._builder.AddNamedSystem(f"{name}_clock", primitives.TrajectorySource(_CLOCK))
         shifted = _affine(np.ones(1), np.array([-clock_shift(self._deployment, self._robot)]))
         stamp = self._append(clock.get_output_port(0), [(f"{name}_instant", shifted)])
         self._builder.Connect(stamp, joined.get_input_port(1))
@@ -124,7 +114,7 @@ class Wrapping:
         blocks: list[tuple[str, LeafSystem | None]]
         blocks = [(f"{name}_biased", _distortion(self._own, name, size))]
         if period is not None and shift:
-            shifted = ShiftedMeasurement(size, shift / period, period, self._own.sample_offset)
+            shifted = systems.ShiftedMeasurement(size, shift / period, period, self._own.sample_offset)
             blocks.append((f"{name}_shifted", shifted))
             self.delays.append(shifted)
         if period is not None:
@@ -171,21 +161,21 @@ class Wrapping:
         blocks: list[tuple[str, LeafSystem]] = []
         if silence is not None and silence.motors != "working":
             blocks.append(("motors", self._interruption(size, silence, held=silence.motors == "held")))
-        blocks.append(("effort_hold", ZeroOrderHold(period, size, self._own.sample_offset)))
+        blocks.append(("effort_hold", primitives.ZeroOrderHold(period, size, self._own.sample_offset)))
         return self._append(effort, blocks)
 
     def actuate(self, effort: OutputPort) -> OutputPort:
         """Return the effort of the actuators: after limits and lag."""
         size = effort.size()
         limits = effort_limits(self._deployment, size - 3)
-        blocks: list[tuple[str, LeafSystem]] = [("actuator_limits", LimitedEffort(limits))]
+        blocks: list[tuple[str, LeafSystem]] = [("actuator_limits", systems.LimitedEffort(limits))]
         lag, period = self._deployment.actuators.lag, self._deployment.period
         if lag and period is not None:
-            blocks.append(("actuator_lag", LaggingEffort(size, lag, period, self._own.sample_offset)))
+            blocks.append(("actuator_lag", systems.LaggingEffort(size, lag, period, self._own.sample_offset)))
         elif lag:
-            blocks.append(("effort_in_kilonewtons", Gain(1.0 / _KILO, size)))
-            blocks.append(("actuator_lag", FirstOrderLowPassFilter(lag, size)))
-            blocks.append(("lagged_effort", Gain(_KILO, size)))
+            blocks.append(("effort_in_kilonewtons", primitives.Gain(1.0 / _KILO, size)))
+            blocks.append(("actuator_lag", primitives.FirstOrderLowPassFilter(lag, size)))
+            blocks.append(("lagged_effort", primitives.Gain(_KILO, size)))
         return self._append(effort, blocks)
 
     def send(self, message: OutputPort, name: str = "reports", use: int = 0) -> OutputPort:
@@ -204,7 +194,7 @@ class Wrapping:
             before = NOTHING if use == 0 else 0.0
             blocks.append((name, self._interruption(message.size(), silence, held=True, before=before)))
         if offset:
-            blocks.append((f"{name}_of_samples", ZeroOrderHold(period, message.size(), offset)))
+            blocks.append((f"{name}_of_samples", primitives.ZeroOrderHold(period, message.size(), offset)))
         radio = build_radio(self._deployment, self._robot, use)
         return self._append(message, [*blocks, ("radio" if use == 0 else f"{name}_radio", radio)])
 
@@ -226,14 +216,14 @@ class Wrapping:
             entry = block.get_input_port(0)
         self._builder.ExportInput(entry, name)
 
-    def _noise(self, name: str, size: int, period: float) -> MeasurementNoise | None:
+    def _noise(self, name: str, size: int, period: float) -> systems.MeasurementNoise | None:
         """Return the block that adds noise and waves to a measured port, None if there are neither."""
         deviations = measurement_deviations(self._deployment, name, size)
         waves = measurement_waves(self._deployment, name, size, period)
         if not deviations.any() and not waves[:, 0].any():
             return None
         seed = seed_of(self._deployment, self._robot, NOISE_USES[name])
-        return MeasurementNoise(deviations, waves, period, seed)
+        return systems.MeasurementNoise(deviations, waves, period, seed)
 
     def _delays(self, size: int, periods: int) -> list[Holding]:
         """Return the blocks that delay a signal by a number of control periods.
@@ -246,14 +236,14 @@ class Wrapping:
         if periods == 0:
             return []
         if offset == 0.0:
-            return [DiscreteTimeDelay(period, periods - 1, size)]
-        return [ZeroOrderHold(period, size, offset) for _ in range(periods)]
+            return [primitives.DiscreteTimeDelay(period, periods - 1, size)]
+        return [primitives.ZeroOrderHold(period, size, offset) for _ in range(periods)]
 
-    def _losses(self, name: str, size: int, period: float) -> LossyMeasurement | None:
+    def _losses(self, name: str, size: int, period: float) -> systems.LossyMeasurement | None:
         m = self._deployment.measurements
         if m.loss == 0.0 and m.late == 0.0:
             return None
-        return LossyMeasurement(
+        return systems.LossyMeasurement(
             size,
             period,
             loss=m.loss,
@@ -265,8 +255,8 @@ class Wrapping:
 
     def _interruption(
         self, size: int, silence: Silence | Deafness, *, held: bool, before: float = 0.0
-    ) -> Interruption:
-        return Interruption(
+    ) -> systems.Interruption:
+        return systems.Interruption(
             size,
             self._deployment.period or 0.0,
             begin=silence.begin,
@@ -303,7 +293,7 @@ def measurement_waves(deployment: Deployment, name: str, size: int, period: floa
     return np.array([[wave.size, wave.period / period, wave.phase] for wave in waves])
 
 
-def _distortion(own: RobotDepartures, name: str, size: int) -> AffineSystem | None:
+def _distortion(own: RobotDepartures, name: str, size: int) -> primitives.AffineSystem | None:
     """Return the block of the constant errors of what a robot measures; None if it has none."""
     factors, offsets = np.ones(size), np.zeros(size)
     if name == "object_pose":
@@ -314,10 +304,10 @@ def _distortion(own: RobotDepartures, name: str, size: int) -> AffineSystem | No
     return None if own.pose_bias == PoseBias() and own.odometry_scale == 0.0 else _affine(factors, offsets)
 
 
-def _affine(factors: FloatArray, offsets: FloatArray) -> AffineSystem:
+def _affine(factors: FloatArray, offsets: FloatArray) -> primitives.AffineSystem:
     """Return Drake's block of y_i = f_i u_i + o_i, which has no state."""
     n, none = len(factors), np.zeros(0)
-    return AffineSystem(
+    return primitives.AffineSystem(
         A=np.zeros((0, 0)), B=np.zeros((0, n)), f0=none, C=np.zeros((n, 0)), D=np.diag(factors), y0=offsets
     )
 
@@ -423,7 +413,7 @@ def _prepare(delays: tuple[Holding, ...], root: Context) -> None:
     for delay in delays:
         context = delay.GetMyMutableContextFromRoot(root)
         now, state = delay.get_input_port(0).Eval(context), context.get_mutable_discrete_state_vector()
-        lossy = isinstance(delay, LossyMeasurement)
+        lossy = isinstance(delay, systems.LossyMeasurement)
         at_rest = delay.state_at_rest(now) if lossy else np.tile(now, state.size() // len(now))
         state.SetFromVector(at_rest)
 
@@ -466,10 +456,12 @@ def build_body(deployment: Deployment, robot: int, name: str, joints: int) -> Bo
     wrapping = Wrapping(builder, deployment, robot, name)
     for entry in _MEASURED:
         elements = {f"measured_{entry}": [(0, i) for i in range(sizes[entry])]}
-        given = builder.AddNamedSystem(f"given_{entry}", build_selector({entry: sizes[entry]}, elements))
+        given = builder.AddNamedSystem(
+            f"given_{entry}", systems.build_selector({entry: sizes[entry]}, elements)
+        )
         builder.ExportOutput(wrapping.measure_stamped(given.get_input_port(0)), f"{entry}_stamp")
         builder.ExportOutput(given.get_output_port(0), f"measured_{entry}")
-    command = builder.AddNamedSystem("effort_command", PassThrough(3 + joints))
+    command = builder.AddNamedSystem("effort_command", primitives.PassThrough(3 + joints))
     builder.ExportInput(command.get_input_port(), "effort_command")
     builder.ExportOutput(wrapping.actuate(command.get_output_port()), "robot_effort")
     return Body(builder.Build(), tuple(wrapping.delays))

@@ -9,33 +9,11 @@ import numpy as np
 from pydrake.systems.framework import Diagram, DiagramBuilder, LeafSystem, OutputPort
 from pydrake.systems.primitives import Demultiplexer, DiscreteTimeIntegrator, Integrator, ZeroOrderHold
 
+from coop_drake import systems
 from coop_drake.answers.plan import Plan
 from coop_drake.laws.readiness import ArrivalGoal
 from coop_drake.plant import ObjectInertia, RobotPlant
 from coop_drake.scenario import Hold
-from coop_drake.systems import (
-    ArrivalMonitor,
-    AxisLaw,
-    AxisMotion,
-    AxisPpc,
-    DepartureMonitor,
-    DisturbanceObserver,
-    FunnelClock,
-    GovernedCell,
-    HoldMonitor,
-    HoldReceiver,
-    MonitoredRobot,
-    NominalAxes,
-    NominalGovernor,
-    NominalMotion,
-    ObjectEstimator,
-    ReadyMonitor,
-    ReferenceGovernor,
-    RobotEffort,
-    StatePredictor,
-    WrenchLaw,
-    axis_laws,
-)
 from coop_drake.tree.pose import FloatArray, PlanarPose
 
 TELEMETRY = (
@@ -84,7 +62,7 @@ class RobotKnowledge:
     object_inertia: ObjectInertia
     load_share: float
     plan: Plan
-    cells: Sequence[GovernedCell]
+    cells: Sequence[systems.GovernedCell]
     position_tolerance: float
     goal: ArrivalGoal
     period: float | None = None
@@ -92,9 +70,9 @@ class RobotKnowledge:
     predicted_periods: int = 0
     observer_gains: tuple[float, float] | None = None
     hold: Hold | None = None
-    motion: NominalMotion | None = None
-    axis_motion: AxisMotion | None = None
-    monitored: MonitoredRobot | None = None
+    motion: systems.NominalMotion | None = None
+    axis_motion: systems.AxisMotion | None = None
+    monitored: systems.MonitoredRobot | None = None
     measured_age: float = 0.0
 
     @property
@@ -169,18 +147,18 @@ def _blocks(knowledge: RobotKnowledge) -> dict[str, LeafSystem]:
     plan, cells, inertia, p_LE = knowledge.plan, knowledge.cells, knowledge.object_inertia, knowledge.p_LE
     joints = range(knowledge.joints.start, knowledge.joints.stop)
     axes = [0, *(1 + i for i in joints)]
-    laws, paced = axis_laws(plan, axes), knowledge.hold is not None
+    laws, paced = systems.axis_laws(plan, axes), knowledge.hold is not None
     return {
-        "object_estimator": ObjectEstimator(knowledge.robot, p_LE),
+        "object_estimator": systems.ObjectEstimator(knowledge.robot, p_LE),
         **_governor(knowledge, paced=paced),
-        "axis_ppc": AxisPpc(
+        "axis_ppc": systems.AxisPpc(
             laws,
             start=plan.start[2:][np.array(axes)],
             period=knowledge.period,
             offset=knowledge.sample_offset,
             paced=paced,
         ),
-        "wrench_law": WrenchLaw(
+        "wrench_law": systems.WrenchLaw(
             p_LE,
             p_LLcm=inertia.p_LLcm,
             mass=inertia.mass,
@@ -188,8 +166,8 @@ def _blocks(knowledge: RobotKnowledge) -> dict[str, LeafSystem]:
             share=knowledge.load_share,
             joints=len(joints),
         ),
-        "robot_effort": RobotEffort(knowledge.robot),
-        "ready_monitor": ReadyMonitor(
+        "robot_effort": systems.RobotEffort(knowledge.robot),
+        "ready_monitor": systems.ReadyMonitor(
             cells,
             laws,
             [transition.inradius for transition in plan.transitions],
@@ -206,19 +184,19 @@ def _blocks(knowledge: RobotKnowledge) -> dict[str, LeafSystem]:
 def _governor(knowledge: RobotKnowledge, *, paced: bool) -> dict[str, LeafSystem]:
     """Return the block that moves p_G: by the measured position, or by the nominal one."""
     if knowledge.motion is None:
-        return {"reference_governor": ReferenceGovernor(knowledge.cells, paced=paced)}
-    return {"nominal_governor": NominalGovernor(knowledge.cells, knowledge.motion, paced=paced)}
+        return {"reference_governor": systems.ReferenceGovernor(knowledge.cells, paced=paced)}
+    return {"nominal_governor": systems.NominalGovernor(knowledge.cells, knowledge.motion, paced=paced)}
 
 
-def _additions(knowledge: RobotKnowledge, laws: Sequence[AxisLaw]) -> dict[str, LeafSystem]:
+def _additions(knowledge: RobotKnowledge, laws: Sequence[systems.AxisLaw]) -> dict[str, LeafSystem]:
     """Return the blocks that sampling, a budget and a scenario's section ``control`` add."""
     added: dict[str, LeafSystem] = {}
     if knowledge.period is not None:
-        added["arrival_monitor"] = ArrivalMonitor(
+        added["arrival_monitor"] = systems.ArrivalMonitor(
             knowledge.goal, len(knowledge.cells), knowledge.period, knowledge.sample_offset
         )
     if knowledge.predicted_periods and knowledge.period is not None:
-        added["state_predictor"] = StatePredictor(
+        added["state_predictor"] = systems.StatePredictor(
             knowledge.robot,
             knowledge.load,
             knowledge.predicted_periods,
@@ -226,21 +204,21 @@ def _additions(knowledge: RobotKnowledge, laws: Sequence[AxisLaw]) -> dict[str, 
             offset=knowledge.sample_offset,
         )
     if knowledge.axis_motion is not None:
-        added["nominal_axes"] = NominalAxes(knowledge.axis_motion)
+        added["nominal_axes"] = systems.NominalAxes(knowledge.axis_motion)
     if knowledge.hold is not None:
         period, offset = knowledge.period, knowledge.sample_offset
         silence = knowledge.hold.silence
-        added["hold_receiver"] = HoldReceiver(silence, period=period, offset=offset)
-        added["funnel_clock"] = FunnelClock(period, offset)
+        added["hold_receiver"] = systems.HoldReceiver(silence, period=period, offset=offset)
+        added["funnel_clock"] = systems.FunnelClock(period, offset)
         alarmed = knowledge.monitored is not None
-        added["hold_monitor"] = HoldMonitor(
+        added["hold_monitor"] = systems.HoldMonitor(
             laws, knowledge.hold.energy, alarmed=alarmed, period=period, offset=offset
         )
     if knowledge.monitored is not None:
-        added["departure_monitor"] = DepartureMonitor(knowledge.monitored)
+        added["departure_monitor"] = systems.DepartureMonitor(knowledge.monitored)
     if knowledge.observer_gains is not None:
         joints = knowledge.joints.stop - knowledge.joints.start
-        added["disturbance_observer"] = DisturbanceObserver(joints, *knowledge.observer_gains)
+        added["disturbance_observer"] = systems.DisturbanceObserver(joints, *knowledge.observer_gains)
     return added
 
 

@@ -21,19 +21,9 @@ from coop_drake.diagram import Loop, Replacements, World, build_closed_loop
 from coop_drake.diagram.knowledge import arrival_goal
 from coop_drake.geometry.polygons import BoundaryDistance
 from coop_drake.harmonic_maps import HarmonicMap
+from coop_drake.laws import readiness
 from coop_drake.laws.axis_table import ENERGY_BOUND, REST_RATE, axis_table, track_row
 from coop_drake.laws.ppc import governed_gains
-from coop_drake.laws.readiness import (
-    EROSION,
-    ArrivalGoal,
-    axis_ready,
-    clearance_margin,
-    departing_name,
-    funnel_margin,
-    interval_margin,
-    position_arrival,
-    rest_margin,
-)
 from coop_drake.plant import TeamPlant, read_component_tree
 from coop_drake.plant.facts import scenario_digest
 from coop_drake.progress import Progress
@@ -195,7 +185,7 @@ def patience(plan: Plan, cell: int) -> float:
     return PATIENCE_FACTOR * plan.transitions[cell].estimated_time + PATIENCE_ALLOWANCE
 
 
-def blocking_margin(plan: Plan, sample: Sample, goal: ArrivalGoal) -> str:
+def blocking_margin(plan: Plan, sample: Sample, goal: readiness.ArrivalGoal) -> str:
     """Return the condition that is furthest from being met in the current cell, as a phrase with its margin.
 
     Args:
@@ -244,7 +234,7 @@ def _axes(plan: Plan) -> tuple[str, ...]:
 def _intervals(plan: Plan, sample: Sample) -> dict[str, float]:
     transition = plan.transitions[sample.cell]
     return {
-        f"{name} reaches its goal interval": interval_margin(position, lower, upper)
+        f"{name} reaches its goal interval": readiness.interval_margin(position, lower, upper)
         for name, position, lower, upper in zip(
             _axes(plan), sample.z[2:], transition.goal_lower, transition.goal_upper, strict=True
         )
@@ -262,25 +252,25 @@ def _readiness(plan: Plan, sample: Sample) -> dict[str, float]:
         sample.governor_position,
     )
     margins = _intervals(plan, sample) if plan.transitions[sample.cell].gains.rest is None else {}
-    margins["the object's position is safe in the next cell (Delta E)"] = clearance_margin(
+    margins["the object's position is safe in the next cell (Delta E)"] = readiness.clearance_margin(
         margin, stiffness, plan.transitions[sample.cell].inradius
     )
     own = axis_table(plan.funnel(sample.cell), plan.transitions[sample.cell].gains)
     table = axis_table(plan.funnel(following), gains)
     for i, name in enumerate(_axes(plan)):
         if own[i, REST_RATE] > 0.0:
-            margins[f"{name} rests in the middle of its goal interval"] = axis_ready(
+            margins[f"{name} rests in the middle of its goal interval"] = readiness.axis_ready(
                 own[i], table[i], sample.z[2 + i], sample.rates[2 + i]
             )
             continue
         energy = track_row(table[i], 0.0, sample.z[2 + i], sample.rates[2 + i])[1]
-        margins[f"the energy of {name} falls below the next funnel's bound"] = funnel_margin(
+        margins[f"the energy of {name} falls below the next funnel's bound"] = readiness.funnel_margin(
             energy, table[i, ENERGY_BOUND]
         )
     return margins
 
 
-def off_goal(goal: ArrivalGoal, z: FloatArray) -> float:
+def off_goal(goal: readiness.ArrivalGoal, z: FloatArray) -> float:
     """Return how far object and joints are from the goal, over what is tolerated, whatever was measured.
 
     Args:
@@ -291,18 +281,19 @@ def off_goal(goal: ArrivalGoal, z: FloatArray) -> float:
     return float(max(np.hypot(*away[:2]) / goal.tolerances[0], *(away[2:] / goal.tolerances[1:])))
 
 
-def _arrival(plan: Plan, sample: Sample, goal: ArrivalGoal) -> dict[str, float]:
+def _arrival(plan: Plan, sample: Sample, goal: readiness.ArrivalGoal) -> dict[str, float]:
     tolerance, axes = float(goal.tolerances[0]), zip(_axes(plan), sample.z[2:], goal.place[2:], strict=True)
     margins = {
-        f"{name} reaches its goal": 1.0 - abs(position - place) / ((1.0 - EROSION) * room)
+        f"{name} reaches its goal": 1.0 - abs(position - place) / ((1.0 - readiness.EROSION) * room)
         for (name, position, place), room in zip(axes, goal.tolerances[1:], strict=True)
         if room < inf
     }
     distance = float(np.hypot(*(sample.z[:2] - goal.place[:2])))
-    margins["the object reaches its goal position"] = position_arrival(distance, 0.0, tolerance)
+    margins["the object reaches its goal position"] = readiness.position_arrival(distance, 0.0, tolerance)
     speed = float(np.hypot(*sample.rates[:2]))
     margins["the object and the joints come to rest"] = min(
-        position_arrival(0.0, speed, tolerance), rest_margin(float(np.abs(sample.rates[2:]).max()))
+        readiness.position_arrival(0.0, speed, tolerance),
+        readiness.rest_margin(float(np.abs(sample.rates[2:]).max())),
     )
     return margins
 
@@ -367,7 +358,7 @@ class Watch:
         self,
         loop: Loop,
         invariants: Invariants,
-        goal: ArrivalGoal,
+        goal: readiness.ArrivalGoal,
         root: Context,
         progress: Callable[[str, float], None] | None,
         observer: Callable[[Sample], None] | None = None,
@@ -492,5 +483,5 @@ def _departing(team: TeamPlant, plan: Plan, sample: Sample) -> str:
         return ""
     k = int(np.argmax(sample.alarms[:, 1]))
     robot, (_, share, check) = team.robots[k], sample.alarms[k].tolist()
-    what = departing_name(int(check), plan.joint_names[robot.q_slice])
+    what = readiness.departing_name(int(check), plan.joint_names[robot.q_slice])
     return f": {what} departs {share:.3g} times as far as its level allows, as {robot.name} measures it"

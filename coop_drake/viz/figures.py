@@ -20,19 +20,7 @@ from coop_drake.answers.log import SimulationLog
 from coop_drake.answers.plan import Plan
 from coop_drake.answers.problem import PlanningProblem, at_goal
 from coop_drake.answers.speeds import base_speeds
-from coop_drake.drawing.canvas import (
-    DPI,
-    draw_polygon,
-    draw_team,
-    draw_workspace,
-    frame_of,
-    house_style,
-    legend_above,
-    new_figure,
-    picture_of,
-    set_margins,
-    team_legend,
-)
+from coop_drake.drawing import canvas
 from coop_drake.drawing.colours import BLUE, GREEN, GREY, INK, OBJECT, OUTSIDE, SKY, robot_colour
 from coop_drake.files import write_atomically
 from coop_drake.tree.component_tree import ComponentTree
@@ -67,11 +55,11 @@ def overview_figure(problem: PlanningProblem, plan: Plan | None = None, caption:
     are regions of the object's position, its targets dots on a line.
     """
     figure, ax = _floor_axes(problem.workspace, caption)
-    handles = team_legend(problem.tree)
+    handles = canvas.team_legend(problem.tree)
     if plan is not None:
         handles.append(Patch(facecolor=SKY, edgecolor=SKY, alpha=0.5, label="cells"))
         _draw_cells(ax, plan)
-    legend_above(ax, handles)
+    canvas.legend_above(ax, handles)
     free = problem.start[3:] if plan is None else _joints_at_end(plan)
     goal = at_goal(problem.goal_pose, problem.goal_joints, free)
     _draw_ends(ax, problem.tree, problem.start, goal)
@@ -88,7 +76,9 @@ def refused_figure(problem: PlanningProblem, plan: Plan) -> Figure:
     for refusal in plan.refused_by:
         transition = plan.transitions[refusal.cell]
         axes = 0.5 * (transition.goal_lower + transition.goal_upper)
-        draw_team(ax, problem.tree, np.concatenate([transition.target, axes]), colour=OUTSIDE, zorder=4.0)
+        canvas.draw_team(
+            ax, problem.tree, np.concatenate([transition.target, axes]), colour=OUTSIDE, zorder=4.0
+        )
         _label(ax, refusal.limit, transition.target, color=OUTSIDE)
     return figure
 
@@ -100,7 +90,7 @@ def start_and_goal_figure(workspace: Polygon, tree: ComponentTree, plan: Plan) -
     """
     caption = "Figure 4. Start and goal configuration of the robots and the object."
     figure, ax = _floor_axes(workspace, caption)
-    legend_above(ax, team_legend(tree))
+    canvas.legend_above(ax, canvas.team_legend(tree))
     goal = at_goal(plan.goal_pose, plan.goal_joints, _joints_at_end(plan))
     _draw_ends(ax, tree, plan.start, goal)
     return figure
@@ -115,7 +105,7 @@ def path_figure(workspace: Polygon, tree: ComponentTree, log: SimulationLog) -> 
     figure, ax = _floor_axes(workspace, caption)
     rows = _rows_along(log)
     for row, alpha in zip(rows, np.linspace(*_OPACITIES, len(rows)), strict=True):
-        draw_team(ax, tree, np.concatenate([log.object_pose[row], log.joints[row]]), alpha=alpha)
+        canvas.draw_team(ax, tree, np.concatenate([log.object_pose[row], log.joints[row]]), alpha=alpha)
     ax.plot(log.object_pose[:, 0], log.object_pose[:, 1], color=INK, linewidth=1.4, zorder=5)
     for row in rows:
         ax.plot(*log.object_pose[row, :2], "o", color=INK, markersize=3, zorder=5)
@@ -127,27 +117,29 @@ def path_figure(workspace: Polygon, tree: ComponentTree, log: SimulationLog) -> 
             fontsize=7.5,
             zorder=6,
         )
-    legend_above(ax, team_legend(tree))
+    canvas.legend_above(ax, canvas.team_legend(tree))
     return figure
 
 
 def _floor_axes(workspace: Polygon, caption: str) -> tuple[Figure, Axes]:
     """Return a figure whose axes show the floor and are just as large."""
-    x_min, y_min, x_max, y_max = frame_of(workspace)
+    x_min, y_min, x_max, y_max = canvas.frame_of(workspace)
     aspect = (y_max - y_min) / (x_max - x_min)
     height = min(_TALLEST, max(_LOWEST, _FLOOR_WIDTH * aspect))
     width = min(_WIDEST, max(_NARROWEST, height / aspect))
     margins = (0.65, 0.15, 0.3)
-    figure = new_figure(width + margins[0] + margins[1], height + margins[2] + 0.8, caption, margins=margins)
+    figure = canvas.new_figure(
+        width + margins[0] + margins[1], height + margins[2] + 0.8, caption, margins=margins
+    )
     ax = figure.subplots()
-    draw_workspace(ax, workspace)
+    canvas.draw_workspace(ax, workspace)
     return figure, ax
 
 
 def _draw_ends(ax: Axes, tree: ComponentTree, start: FloatArray, goal: FloatArray) -> None:
     """Draw the team at both ends, z = (x, y, theta, q...) of shape (3 + n,) [m, rad], and name them."""
     for label, z in (("start", start), ("goal", goal)):
-        draw_team(ax, tree, z)
+        canvas.draw_team(ax, tree, z)
         ax.plot(z[0], z[1], "o", color=INK, markersize=3, zorder=5)
         _label(ax, label, z)
 
@@ -167,8 +159,8 @@ def _joints_at_end(plan: Plan) -> FloatArray:
 def _draw_cells(ax: Axes, plan: Plan) -> None:
     """Draw the region of every cell, and a line through the targets."""
     for cell in plan.cells:
-        draw_polygon(ax, cell.tidied, facecolor=SKY, edgecolor="none", alpha=0.25, zorder=2)
-        draw_polygon(ax, cell.tidied, facecolor="none", edgecolor=SKY, linewidth=0.7, zorder=2.1)
+        canvas.draw_polygon(ax, cell.tidied, facecolor=SKY, edgecolor="none", alpha=0.25, zorder=2)
+        canvas.draw_polygon(ax, cell.tidied, facecolor="none", edgecolor=SKY, linewidth=0.7, zorder=2.1)
     targets = np.array([plan.start[:2], *(transition.target for transition in plan.transitions)])
     ax.plot(targets[:, 0], targets[:, 1], ".-", color=INK, linewidth=0.8, markersize=4, zorder=2.2)
 
@@ -217,7 +209,7 @@ class TimeAxes:
         for _, figure, axes in self._ahead:
             for ax in axes:
                 ax.set(xlim=_TICKED, ylim=_TICKED)
-            figure.set_dpi(DPI)
+            figure.set_dpi(canvas.DPI)
             figure.canvas.draw()
             for ax in axes:
                 ax.set_autoscale_on(True)
@@ -242,7 +234,7 @@ class TimeAxes:
             caption = f"{caption} Dashed lines mark the switches from cell to cell."
         figure, axes = self._taken(count) or _blank(count)
         figure.set_size_inches(_WIDTH, count * (height + _GAP) + 1.0)
-        set_margins(figure, caption, _MARGINS)
+        canvas.set_margins(figure, caption, _MARGINS)
         figure.subplots_adjust(hspace=_GAP / height)
         marked = log.times[1:][np.diff(log.cell_index) != 0] if switches else []
         for ax, label in zip(axes, labels, strict=True):
@@ -306,7 +298,7 @@ def position_figure(log: SimulationLog, time_axes: TimeAxes = _NONE_AHEAD) -> Fi
     for axis, ax in enumerate(axes):
         ax.plot(log.times, log.governor_position[:, axis], color=GREY, linewidth=0.9, label="governor")
         ax.plot(log.times, log.object_pose[:, axis], color=OBJECT, label="object")
-    legend_above(axes[0])
+    canvas.legend_above(axes[0])
     return figure
 
 
@@ -319,7 +311,7 @@ def angle_figure(log: SimulationLog, time_axes: TimeAxes = _NONE_AHEAD) -> Figur
     for ax, origin in zip(axes, (np.zeros_like(middle), middle), strict=True):
         _draw_funnel(ax, log, 0, origin)
         ax.plot(*break_at_switches(log, log.object_pose[:, 2] - origin), color=OBJECT, label="θ")
-    legend_above(axes[0])
+    canvas.legend_above(axes[0])
     return figure
 
 
@@ -337,7 +329,7 @@ def joints_figure(
     for joint, ax in zip(joints, axes, strict=True):
         _draw_funnel(ax, log, 1 + joint.index, np.zeros_like(log.times))
         ax.plot(log.times, log.joints[:, joint.index], color=robot_colour(robot), label="joint")
-    legend_above(axes[0])
+    canvas.legend_above(axes[0])
     return figure
 
 
@@ -362,7 +354,7 @@ def summary_figure(log: SimulationLog, time_axes: TimeAxes = _NONE_AHEAD) -> Fig
         ax.plot(at, values, color=colour, linewidth=1.0, label=label)
     for ax in (clearances, speeds, forces):
         ax.set_ylim(bottom=min(0.0, ax.get_ylim()[0] if ax.dataLim.y0 < 0.0 else 0.0))
-        legend_above(ax)
+        canvas.legend_above(ax)
     return figure
 
 
@@ -403,8 +395,8 @@ class RunFigures:
 
     def __init__(self, workspace: Polygon, tree: ComponentTree, plan: Plan) -> None:
         self._workspace, self._tree = workspace, tree
-        with house_style():
-            self._start_and_goal = picture_of(start_and_goal_figure(workspace, tree, plan))
+        with canvas.house_style():
+            self._start_and_goal = canvas.picture_of(start_and_goal_figure(workspace, tree, plan))
             self._time_axes = TimeAxes(panel_counts(tree))
 
     def write(
@@ -416,11 +408,11 @@ class RunFigures:
         """
         written = []
         known = list(self._figures(log))
-        with house_style():
+        with canvas.house_style():
             for name, draw in known if numbers is None else (known[number] for number in numbers):
                 figure = draw()
                 if figure is not None:
-                    picture = figure if isinstance(figure, bytes) else picture_of(figure)
+                    picture = figure if isinstance(figure, bytes) else canvas.picture_of(figure)
                     written.append(write_atomically(directory / f"{name}.png", picture))
         return written
 

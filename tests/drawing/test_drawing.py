@@ -6,17 +6,8 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from shapely import Point, Polygon, box
 
+from coop_drake.drawing import solids
 from coop_drake.drawing.canvas import draw_workspace, new_figure, save_figure
-from coop_drake.drawing.solids import (
-    camera_pose,
-    flat_mesh,
-    joined,
-    ribbon_mesh,
-    ring_lines,
-    slab_mesh,
-    tube_mesh,
-    wall_polygons,
-)
 
 
 @pytest.mark.parametrize(("suffix", "begins"), [(".png", b"\x89PNG"), (".svg", b"<?xml")])
@@ -52,7 +43,7 @@ def test_a_pillar_has_the_colour_of_the_walls_whichever_way_its_ring_goes(ring):
 @pytest.mark.parametrize("turn", [0.0, 0.7])
 @pytest.mark.parametrize("floor", [box(0, 0, 7, 10), box(-20, 3, 20, 6), box(0, 0, 1, 30)])
 def test_every_corner_is_in_the_picture_and_the_picture_is_filled(floor, turn):
-    position, target = camera_pose(floor, 0.5, turn=turn)
+    position, target = solids.camera_pose(floor, 0.5, turn=turn)
     forward = (target - position) / np.linalg.norm(target - position)
     right = np.array([np.cos(turn), np.sin(turn), 0.0])
     up = np.cross(right, forward)
@@ -78,42 +69,42 @@ def area(mesh):
 
 
 def test_a_flat_mesh_has_the_polygons_area_and_height():
-    mesh = flat_mesh([FLOOR], 0.3)
+    mesh = solids.flat_mesh([FLOOR], 0.3)
     assert area(mesh) == pytest.approx(FLOOR.area)
     assert set(mesh.vertices[:, 2]) == {0.3}
 
 
 def test_a_wall_has_its_top_and_all_its_sides():
-    assert area(slab_mesh([FLOOR], 0.0, 0.5)) == pytest.approx(FLOOR.area + 0.5 * FLOOR.length)
+    assert area(solids.slab_mesh([FLOOR], 0.0, 0.5)) == pytest.approx(FLOOR.area + 0.5 * FLOOR.length)
 
 
 def test_walls_stand_beside_the_floor_never_on_it():
-    walls = wall_polygons(FLOOR, 0.1)
+    walls = solids.wall_polygons(FLOOR, 0.1)
     assert sum(wall.intersection(FLOOR).area for wall in walls) == pytest.approx(0.0, abs=1e-12)
     assert sum(wall.area for wall in walls) > FLOOR.exterior.length * 0.1
 
 
 def test_a_thin_wall_between_two_rooms_is_drawn_whole():
     rooms = box(0, 0, 3, 2) | box(3.2, 0, 6, 2) | box(2, 0.8, 4, 1.2)
-    within = [wall for wall in wall_polygons(rooms, 0.08) if wall.contains(Point(3.1, 1.5))]
+    within = [wall for wall in solids.wall_polygons(rooms, 0.08) if wall.contains(Point(3.1, 1.5))]
     assert len(within) == 1
 
 
 def test_ring_lines_run_once_round_every_ring():
-    start, end = ring_lines([FLOOR, box(0, 0, 1, 1)], 0.2)
+    start, end = solids.ring_lines([FLOOR, box(0, 0, 1, 1)], 0.2)
     assert start.shape == end.shape == (3, 5 + 3 + 4)
     assert np.linalg.norm(end - start, axis=0).sum() == pytest.approx(FLOOR.length + 4.0)
 
 
 def test_a_slab_stands_between_its_heights():
-    mesh = slab_mesh([FLOOR], 0.2, 0.3)
+    mesh = solids.slab_mesh([FLOOR], 0.2, 0.3)
     assert area(mesh) == pytest.approx(FLOOR.area + 0.1 * FLOOR.length)
     assert (mesh.vertices[:, 2].min(), mesh.vertices[:, 2].max()) == (0.2, 0.3)
 
 
 def test_a_ribbon_has_two_triangles_a_piece_in_the_order_of_the_line():
     points = np.column_stack([np.linspace(0.0, 3.0, 7), np.zeros(7)])
-    mesh = ribbon_mesh(points, 0.1, 0.02)
+    mesh = solids.ribbon_mesh(points, 0.1, 0.02)
     assert mesh.faces.shape == (12, 3)
     assert area(mesh) == pytest.approx(0.3)
     middles = mesh.vertices[mesh.faces, 0].mean(axis=1).reshape(-1, 2).mean(axis=1)
@@ -121,12 +112,12 @@ def test_a_ribbon_has_two_triangles_a_piece_in_the_order_of_the_line():
 
 
 def test_joined_meshes_keep_their_areas():
-    mesh = joined([flat_mesh([FLOOR], 0.0), slab_mesh([FLOOR], 0.2, 0.3)])
+    mesh = solids.joined([solids.flat_mesh([FLOOR], 0.0), solids.slab_mesh([FLOOR], 0.2, 0.3)])
     assert area(mesh) == pytest.approx(2.0 * FLOOR.area + 0.1 * FLOOR.length)
 
 
 def test_a_tube_has_the_surface_of_a_prism_and_stops_where_the_line_is_interrupted():
     points = np.array([[0.0, 0.0, 0.0], [2.0, 0.0, 0.0], [np.nan] * 3, [5.0, 1.0, 0.0], [5.0, 1.0, 3.0]])
-    mesh = tube_mesh(points, 0.01)
+    mesh = solids.tube_mesh(points, 0.01)
     # Six sides as broad as the radius; each of the two pieces is longer by the radius.
     assert area(mesh) == pytest.approx(6 * 0.01 * (5.0 + 2 * 0.01))

@@ -9,18 +9,7 @@ from hypothesis import strategies as st
 from pydrake.systems.framework import DiagramBuilder
 
 from coop_drake.diagram import brakes_of
-from coop_drake.laws.actuators import (
-    ACCELERATION,
-    RATE,
-    RETURN_RATE,
-    USED,
-    Brake,
-    braking_damping,
-    braking_effort,
-    closed_after,
-    slow_motion,
-    slow_samples,
-)
+from coop_drake.laws import actuators
 from coop_drake.laws.axis_table import DECAY_RATE, FADING_TIME, LAW_COLUMNS, RAMP_RATE, bounds_of
 from coop_drake.plant import build_team_plant
 from coop_drake.plant.team import base_inertia
@@ -32,21 +21,23 @@ from tests.support.small_scenario import small_scenario
 @pytest.mark.parametrize("distance", [1e-4, 0.05, 0.4, 3.0])
 def test_the_way_keeps_to_its_bounds_and_ends_at_rest(distance, share):
     T = 0.005
-    samples = slow_samples(distance, T, share)
+    samples = actuators.slow_samples(distance, T, share)
     ends = np.array([[1.0, 0.2], [1.0 - distance, 0.2]])
-    motions = [slow_motion(ends, k * T, samples * T) for k in range(samples + 1)]
+    motions = [actuators.slow_motion(ends, k * T, samples * T) for k in range(samples + 1)]
     x, v, a = (np.array(part) for part in zip(*motions, strict=True))
     assert (x[0], x[-1]) == (pytest.approx(ends[0]), pytest.approx(ends[1]))
     assert np.abs([v[0], v[-1], a[0], a[-1]]).max() < 1e-12
-    assert np.abs(v).max() <= USED * share * RATE
-    assert np.abs(a).max() <= USED * share * ACCELERATION
-    assert np.gradient(x[:, 0], T)[1:-1] == pytest.approx(v[1:-1, 0], abs=2e-3 * USED * RATE)
+    assert np.abs(v).max() <= actuators.USED * share * actuators.RATE
+    assert np.abs(a).max() <= actuators.USED * share * actuators.ACCELERATION
+    assert np.gradient(x[:, 0], T)[1:-1] == pytest.approx(
+        v[1:-1, 0], abs=2e-3 * actuators.USED * actuators.RATE
+    )
     assert (x[:, 1] == 0.2).all()
 
 
 def test_before_and_after_it_nothing_moves():
     for time in (-1.0, 7.0):
-        x, v, a = slow_motion(np.array([[0.0], [1.0]]), time, 3.0)
+        x, v, a = actuators.slow_motion(np.array([[0.0], [1.0]]), time, 3.0)
         assert (x[0], v[0], a[0]) == (float(time > 0.0), 0.0, 0.0)
 
 
@@ -54,7 +45,7 @@ def test_funnels_are_closed_gains_ramped_and_jumps_faded_when_the_law_takes_over
     table = np.ones((2, LAW_COLUMNS))
     table[:, :4] = [-0.3, 0.3, -0.05, 0.05]
     table[:, DECAY_RATE], table[:, RAMP_RATE], table[:, FADING_TIME] = [10.0, 5.0], [2.0, 0.0], 0.4
-    time = closed_after(table)
+    time = actuators.closed_after(table)
     assert time == pytest.approx(3.0)
     for row in table:
         assert bounds_of(row, time)[:4] == pytest.approx((-0.05, 0.05, 0.0, 0.0))
@@ -67,9 +58,9 @@ def test_the_damping_follows_from_the_model_of_the_base():
     team = build_team_plant(small_scenario("base"), DiagramBuilder())
     mass, inertia = base_inertia(team.robots[0])
     assert (mass, inertia) == pytest.approx((6.0, 0.1875))
-    damping = braking_damping(mass, inertia, 1)
+    damping = actuators.braking_damping(mass, inertia, 1)
     assert damping == pytest.approx([100.0, 100.0, 1.0, 1.0])
-    assert braking_damping(2.0 * mass, 3.0 * inertia, 1) == pytest.approx([200.0, 200.0, 3.0, 1.0])
+    assert actuators.braking_damping(2.0 * mass, 3.0 * inertia, 1) == pytest.approx([200.0, 200.0, 3.0, 1.0])
 
 
 def test_drives_brake_within_the_limits_of_the_scenario_s_actuators():
@@ -79,15 +70,15 @@ def test_drives_brake_within_the_limits_of_the_scenario_s_actuators():
     for brake in brakes_of(scenario, build_team_plant(scenario, DiagramBuilder())):
         assert brake.limits[[0, 2]].tolist() == [40.0, 3.0]
         fast = np.concatenate([np.zeros(4), [3.0, 4.0, 0.0, 9.0]])
-        assert braking_effort(fast, brake) == pytest.approx([-12.0, -16.0, 0.0, -1.5])
+        assert actuators.braking_effort(fast, brake) == pytest.approx([-12.0, -16.0, 0.0, -1.5])
 
 
 def test_the_power_of_braking_is_negative():
-    damping = braking_damping(6.0, 0.2, 2)
+    damping = actuators.braking_damping(6.0, 0.2, 2)
     for limits in (np.full(4, np.inf), np.array([20.0, 0.1, 0.2, 3.0])):
         for seed in range(20):
             state = np.random.default_rng(seed).normal(size=10)
-            assert braking_effort(state, Brake(damping, limits)) @ state[5:] < 0.0
+            assert actuators.braking_effort(state, actuators.Brake(damping, limits)) @ state[5:] < 0.0
 
 
 @settings(max_examples=60, deadline=None)
@@ -96,29 +87,33 @@ def test_the_power_of_braking_is_negative():
     st.lists(st.floats(0.1, 300.0), min_size=3, max_size=3),
 )
 def test_a_brake_never_asks_for_more_than_its_limits_wherever_its_rest_is(numbers, limits):
-    brake = Brake(braking_damping(6.0, 0.2, 1), np.array(limits))
-    effort = braking_effort(np.array(numbers[:8]), brake, np.array(numbers[8:]))
+    brake = actuators.Brake(actuators.braking_damping(6.0, 0.2, 1), np.array(limits))
+    effort = actuators.braking_effort(np.array(numbers[:8]), brake, np.array(numbers[8:]))
     rounded = 1.0 + 1e-12
     assert np.hypot(effort[0], effort[1]) <= rounded * limits[0]
     assert (np.abs(effort[2:]) <= rounded * brake.limits[1:]).all()
 
 
 def test_drives_pull_to_the_rest_that_they_were_told_and_a_turn_of_the_yaw_is_none():
-    damping, rest = braking_damping(6.0, 0.2, 1), np.array([1.0, 2.0, 3.1, 0.4])
+    damping, rest = actuators.braking_damping(6.0, 0.2, 1), np.array([1.0, 2.0, 3.1, 0.4])
     still = np.concatenate([rest - [0.0, 0.0, 2.0 * np.pi, 0.0], np.zeros(4)])
-    assert braking_effort(still, Brake(damping, FREE), rest) == pytest.approx(np.zeros(4), abs=1e-12)
+    assert actuators.braking_effort(still, actuators.Brake(damping, FREE), rest) == pytest.approx(
+        np.zeros(4), abs=1e-12
+    )
     away = np.concatenate([rest + 0.1, np.zeros(4)])
-    assert braking_effort(away, Brake(damping, FREE), rest) == pytest.approx(-0.1 * RETURN_RATE * damping)
+    assert actuators.braking_effort(away, actuators.Brake(damping, FREE), rest) == pytest.approx(
+        -0.1 * actuators.RETURN_RATE * damping
+    )
 
 
 def test_two_loads_that_brake_towards_the_rest_of_a_motion_overshoot_less_than_they_would_coast():
     limits = np.array([30.0, 1.0])
     for mass, limit in ((3.0, FREE[:2]), (8.5, FREE[:2]), (20.0, FREE[:2]), (3.0, limits), (8.5, limits)):
-        brake, T, farthest = Brake(braking_damping(6.0, 0.2, 0), limit), 1e-3, []
+        brake, T, farthest = actuators.Brake(actuators.braking_damping(6.0, 0.2, 0), limit), 1e-3, []
         for rest in (np.zeros(3), None):
             state, far = np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0]), 0.0
             for _ in range(6000):
-                state[3:] += T * braking_effort(state, brake, rest) / [mass, mass, 0.2]
+                state[3:] += T * actuators.braking_effort(state, brake, rest) / [mass, mass, 0.2]
                 state[:3] += T * state[3:]
                 far = max(far, state[0])
             farthest.append(far)

@@ -4,21 +4,7 @@ import numpy as np
 import pytest
 
 from coop_drake.answers.budget import AxisTracking, Budget
-from coop_drake.laws.measurements import (
-    FASTEST,
-    LEAK,
-    PHASE,
-    observe,
-    observer_gains,
-    predict,
-    random_words,
-    square_wave,
-    uniform_pair,
-    wanted_accelerations,
-    whole_periods,
-    write_errors,
-    write_normals,
-)
+from coop_drake.laws import measurements
 from coop_drake.laws.robot_dynamics import (
     base_acceleration,
     end_effector_command,
@@ -36,12 +22,12 @@ from tests.support.robot_matrices import robot_acceleration
     ("phase", "signs"), [(0.0, "++--++--"), (0.25, "+--++--+"), (0.5, "--++--++"), (1.0, "++--++--")]
 )
 def test_a_wave_is_positive_in_its_first_half(phase, signs):
-    values = [square_wave(number, 0.2, 4.0, phase) for number in range(8)]
+    values = [measurements.square_wave(number, 0.2, 4.0, phase) for number in range(8)]
     assert values == [0.2 if sign == "+" else -0.2 for sign in signs]
 
 
 def test_a_wave_that_is_no_whole_number_of_periods_has_the_right_mean_length():
-    values = np.array([square_wave(number, 1.0, 7.3, 0.1) for number in range(7300)])
+    values = np.array([measurements.square_wave(number, 1.0, 7.3, 0.1) for number in range(7300)])
     assert np.count_nonzero(np.diff(values) > 0.0) == int(7299 / 7.3 + 0.1)
     assert abs(values.mean()) < 0.02
 
@@ -53,8 +39,8 @@ def test_noise_and_waves_add_up_and_neither_acts_where_it_is_not_asked_for():
     )
     errors, drawn = np.empty(3), np.empty(3)
     for number in range(4):
-        write_errors(9, deviations, waves, number, errors)
-        write_normals(9, number, drawn)
+        measurements.write_errors(9, deviations, waves, number, errors)
+        measurements.write_normals(9, number, drawn)
         sign = 1.0 if number % 2 == 0 else -1.0
         np.testing.assert_allclose(errors, deviations * drawn + sign * waves[:, 0], atol=1e-15)
 
@@ -76,11 +62,11 @@ def test_noise_and_waves_add_up_and_neither_acts_where_it_is_not_asked_for():
     ],
 )
 def test_words_are_those_that_were_published(counter, key, expected):
-    assert random_words(counter, key) == expected
+    assert measurements.random_words(counter, key) == expected
 
 
 def test_pairs_are_uniform_and_independent():
-    pairs = np.array([uniform_pair(7, k) for k in range(4000)])
+    pairs = np.array([measurements.uniform_pair(7, k) for k in range(4000)])
     counts, _, _ = np.histogram2d(*pairs.T, bins=5, range=[[0.0, 1.0]] * 2)
     assert np.abs(counts - 160).max() < 5 * np.sqrt(160)
 
@@ -88,7 +74,7 @@ def test_pairs_are_uniform_and_independent():
 def test_normals_have_the_moments_of_a_normal_distribution():
     drawn = np.empty((4000, 7))
     for k in range(len(drawn)):
-        write_normals(3, k, drawn[k])
+        measurements.write_normals(3, k, drawn[k])
     np.testing.assert_allclose(drawn.mean(axis=0), 0.0, atol=0.08)
     np.testing.assert_allclose(np.cov(drawn.T), np.eye(7), atol=0.1)
     np.testing.assert_allclose((drawn**4).mean(axis=0), 3.0, atol=0.6)
@@ -96,25 +82,25 @@ def test_normals_have_the_moments_of_a_normal_distribution():
 
 def test_seed_and_number_decide_and_nothing_else():
     first, again, shorter, other = np.empty(5), np.empty(5), np.empty(3), np.empty(5)
-    write_normals(1, 2**40, first)
-    write_normals(1, 5, other)
-    write_normals(1, 2**40, again)
-    write_normals(1, 2**40, shorter)
+    measurements.write_normals(1, 2**40, first)
+    measurements.write_normals(1, 5, other)
+    measurements.write_normals(1, 2**40, again)
+    measurements.write_normals(1, 2**40, shorter)
     np.testing.assert_array_equal(first, again)
     np.testing.assert_array_equal(first[:3], shorter)
     assert not np.any(first == other)
-    write_normals(2, 2**40, other)
+    measurements.write_normals(2, 2**40, other)
     assert not np.any(first == other)
 
 
 @pytest.mark.parametrize(("time", "periods"), [(0.0, 0), (0.015, 3), (0.3, 60), (0.0151, 4), (0.001, 1)])
 def test_a_time_is_rounded_up_to_whole_periods(time, periods):
-    assert whole_periods(time, 0.005) == periods
+    assert measurements.whole_periods(time, 0.005) == periods
 
 
 def test_a_budget_and_the_gains_count_a_delay_as_the_simulation_does():
     barely_more = 0.01 * (1.0 + 1e-7)  # The simulation delays by a third period.
-    assert whole_periods(barely_more, 0.005) == 3
+    assert measurements.whole_periods(barely_more, 0.005) == 3
     deployment = Deployment(control_rate=200.0, measurements=Measurements(delay=barely_more))
     assert deployment.whole_delay == pytest.approx(0.015)
     loops = [axis_loop(AxisTracking(300.0, 30.0), Budget(delay=delay)) for delay in (barely_more, 0.015)]
@@ -130,7 +116,7 @@ def estimates(disturbance, wanted, gain=GAIN, leak=LEAK_RATE, step=1e-4, end=3.0
     state_rate, estimate = np.empty(1), np.empty(1)
     for time in np.arange(0.0, end, step):
         u = np.array([wanted(time, rate[0])])
-        observe(rate, u, state, gain, leak, state_rate, estimate)
+        measurements.observe(rate, u, state, gain, leak, state_rate, estimate)
         found.append(estimate[0])
         rate = rate + step * (u - estimate + disturbance(time))
         state = state + step * state_rate
@@ -165,22 +151,25 @@ def test_two_robots_that_want_different_things_do_not_drift_apart_for_ever():
     rate, states, estimate = 0.0, np.zeros(2), np.zeros(2)
     state_rate, wanted, step = np.zeros(2), np.array([0.1, -0.1]), 1e-3
     for _ in range(20000):
-        observe(np.full(2, rate), wanted, states, GAIN, LEAK_RATE, state_rate, estimate)
+        measurements.observe(np.full(2, rate), wanted, states, GAIN, LEAK_RATE, state_rate, estimate)
         rate += step * float((wanted - estimate).mean())
         states += step * state_rate
     assert rate == pytest.approx(0.0, abs=1e-9)
     np.testing.assert_allclose(estimate, -wanted * GAIN / LEAK_RATE, rtol=1e-6)
 
 
-@pytest.mark.parametrize(("age", "gain"), [(0.0, FASTEST), (0.001, FASTEST), (0.05, PHASE / 0.05)])
+@pytest.mark.parametrize(
+    ("age", "gain"),
+    [(0.0, measurements.FASTEST), (0.001, measurements.FASTEST), (0.05, measurements.PHASE / 0.05)],
+)
 def test_gains_follow_the_age_of_commands(age, gain):
-    assert observer_gains(age) == (gain, pytest.approx(LEAK * gain))
+    assert measurements.observer_gains(age) == (gain, pytest.approx(measurements.LEAK * gain))
 
 
 @pytest.mark.parametrize("age", [0.0125, 0.05, 0.2])
 def test_the_observer_s_loop_is_well_damped_with_the_age_as_a_delay(age):
     """d^'(t) = l (d - d^(t - age)) - g d^(t) does not overshoot by more than a hundredth."""
-    gain, leak = observer_gains(age)
+    gain, leak = measurements.observer_gains(age)
     step = age / 100.0
     found = np.zeros(100)
     for _ in range(int(20.0 / gain / step)):
@@ -214,7 +203,7 @@ def test_constant_accelerations_are_predicted_exactly(joints):
     robot, pose, grasp = np.concatenate([z, v]), rng.normal(size=3), rng.normal(size=2)
     rows = np.tile(rng.normal(size=6 + joints), (5, 1))
     predicted, predicted_pose, state, period = np.empty(robot.size), np.empty(3), np.empty(6), 0.02
-    predict(arm.chain(), grasp, robot, pose, rows, period, predicted, predicted_pose)
+    measurements.predict(arm.chain(), grasp, robot, pose, rows, period, predicted, predicted_pose)
     estimate_object(arm.chain(), grasp, motion_room(arm.chain()), robot, pose, state)
     time, n = 5 * period, 3 + joints
     for found, x, rate, a in (
@@ -230,7 +219,7 @@ def test_what_is_kept_is_what_was_commanded():
     arm, (z, v) = random_arm(rng, 2), random_state(rng, 2)
     robot, pose, load = np.concatenate([z, v]), rng.normal(size=3), rng.uniform(0.1, 1.0, size=7)
     linear, axes, kept = rng.normal(size=2), rng.normal(size=3), np.empty(8)
-    wanted_accelerations(arm.chain(), load, robot, pose, linear, axes, kept)
+    measurements.wanted_accelerations(arm.chain(), load, robot, pose, linear, axes, kept)
     state, command = np.empty(6), np.empty(6)
     estimate_object(arm.chain(), load[:2], motion_room(arm.chain()), robot, pose, state)
     end_effector_command(load, state, linear, axes, command)

@@ -6,36 +6,16 @@ from math import inf
 import numpy as np
 import pytest
 
-from coop_drake.laws import Funnel, ScheduledGains, transition_gains
+from coop_drake.laws import Funnel, ScheduledGains, readiness, transition_gains
 from coop_drake.laws.axis_table import axis_table
 from coop_drake.laws.gains import RestCondition
-from coop_drake.laws.readiness import (
-    ASKS,
-    BRAKES,
-    FAR,
-    QUIET,
-    QUIET_TIME,
-    ArrivalGoal,
-    alarm_at,
-    arrival_margin,
-    axis_level,
-    axis_ready,
-    clearance_margin,
-    departing_name,
-    funnel_margin,
-    growth,
-    interval_margin,
-    mean_samples,
-    quiet_margin,
-    unseen_time,
-)
 from coop_drake.systems.kernels import ready_conditions
 from tests.support.readiness import margin_of, square_with_clearance
 
 PERIOD = 0.005
 
 
-ROWS = 2 * mean_samples(PERIOD)
+ROWS = 2 * readiness.mean_samples(PERIOD)
 
 
 TIMES = PERIOD * np.arange(ROWS)
@@ -44,7 +24,7 @@ TIMES = PERIOD * np.arange(ROWS)
 PLACE = np.array([1.0, 2.0, 0.5, 0.0])
 
 
-EXACT = ArrivalGoal(PLACE, np.array([0.01, 0.02, np.inf]), np.zeros(3))
+EXACT = readiness.ArrivalGoal(PLACE, np.array([0.01, 0.02, np.inf]), np.zeros(3))
 
 
 CERTIFIED = EXACT._replace(errors=np.array([0.003, 0.002, 0.002]))
@@ -55,7 +35,7 @@ NOISE = np.array([1e-3, 1e-3, 5e-4, 5e-4])
 
 def margin(samples, goal=EXACT, turned=0):
     """Of samples from the oldest to the newest, kept in a ring that begins anywhere."""
-    return arrival_margin(*goal, np.roll(samples, turned, axis=0), (ROWS - 1 + turned) % ROWS)
+    return readiness.arrival_margin(*goal, np.roll(samples, turned, axis=0), (ROWS - 1 + turned) % ROWS)
 
 
 def at(*away):
@@ -73,7 +53,7 @@ def test_at_rest_at_the_goal_it_has_arrived_wherever_the_ring_begins(turned):
 def test_it_measures_for_long_enough_first():
     samples = at(0.0, 0.0, 0.0, 0.0)
     samples[0] = np.inf
-    assert margin(samples) == FAR
+    assert margin(samples) == readiness.FAR
 
 
 @pytest.mark.parametrize(
@@ -129,36 +109,40 @@ def test_a_certified_error_that_jumps_does_not_keep_it_from_arriving_for_ever():
 
 
 def test_a_departure_is_unseen_for_delay_report_and_one_period_in_whole_periods():
-    assert unseen_time(0.01, 0.025, 0.005, 0.0) == pytest.approx(0.04)
-    assert unseen_time(0.011, 0.0, 0.005, 0.0) == pytest.approx(0.02)
-    assert unseen_time(0.011, 0.0, 0.005, 0.001) == pytest.approx(0.021)  # what clocks hide of the age
-    assert growth(0.04, 0.2, 0.04) == pytest.approx(0.0016 + 0.00016)
+    assert readiness.unseen_time(0.01, 0.025, 0.005, 0.0) == pytest.approx(0.04)
+    assert readiness.unseen_time(0.011, 0.0, 0.005, 0.0) == pytest.approx(0.02)
+    assert readiness.unseen_time(0.011, 0.0, 0.005, 0.001) == pytest.approx(
+        0.021
+    )  # what clocks hide of the age
+    assert readiness.growth(0.04, 0.2, 0.04) == pytest.approx(0.0016 + 0.00016)
 
 
 def test_the_level_of_an_axis_is_the_stated_one_or_what_its_room_leaves():
-    assert axis_level(0.02, 0.005, 0.0, -0.1, 0.1) == 0.02
-    assert axis_level(0.02, 0.005, 0.09, -0.1, 0.1) == pytest.approx(0.005)
-    assert axis_level(0.02, 0.005, -0.09, -0.1, 0.1) == pytest.approx(0.005)
+    assert readiness.axis_level(0.02, 0.005, 0.0, -0.1, 0.1) == 0.02
+    assert readiness.axis_level(0.02, 0.005, 0.09, -0.1, 0.1) == pytest.approx(0.005)
+    assert readiness.axis_level(0.02, 0.005, -0.09, -0.1, 0.1) == pytest.approx(0.005)
 
 
 def test_a_monitor_asks_above_its_level_and_a_little_longer_and_brakes_above_twice_the_level():
     long_ago = -1e9
-    assert alarm_at(1.0, 5.0, long_ago) == QUIET
-    assert alarm_at(1.001, 5.0, long_ago) == ASKS
-    assert alarm_at(0.0, 5.0, 5.0 - 0.5 * QUIET_TIME) == ASKS
-    assert alarm_at(0.0, 5.0, 5.0 - 1.1 * QUIET_TIME) == QUIET
-    assert alarm_at(2.001, 5.0, long_ago) == BRAKES
-    assert alarm_at(inf, 5.0, long_ago) == BRAKES
+    assert readiness.alarm_at(1.0, 5.0, long_ago) == readiness.QUIET
+    assert readiness.alarm_at(1.001, 5.0, long_ago) == readiness.ASKS
+    assert readiness.alarm_at(0.0, 5.0, 5.0 - 0.5 * readiness.QUIET_TIME) == readiness.ASKS
+    assert readiness.alarm_at(0.0, 5.0, 5.0 - 1.1 * readiness.QUIET_TIME) == readiness.QUIET
+    assert readiness.alarm_at(2.001, 5.0, long_ago) == readiness.BRAKES
+    assert readiness.alarm_at(inf, 5.0, long_ago) == readiness.BRAKES
 
 
 def test_no_robot_is_ready_while_its_monitor_is_not_quiet():
-    assert quiet_margin(0.3, QUIET) == 0.3
-    assert quiet_margin(0.3, ASKS) == quiet_margin(0.3, BRAKES) == -1.0
-    assert quiet_margin(-2.0, ASKS) == -2.0
+    assert readiness.quiet_margin(0.3, readiness.QUIET) == 0.3
+    assert (
+        readiness.quiet_margin(0.3, readiness.ASKS) == readiness.quiet_margin(0.3, readiness.BRAKES) == -1.0
+    )
+    assert readiness.quiet_margin(-2.0, readiness.ASKS) == -2.0
 
 
 def test_levels_have_names():
-    names = [departing_name(check, ("shoulder", "elbow")) for check in range(11)]
+    names = [readiness.departing_name(check, ("shoulder", "elbow")) for check in range(11)]
     assert names[:6] == [
         "the object's position", "the object's velocity", "its grasp", "the angle of its base",
         "where the object goes", "the object's angle",
@@ -233,11 +217,11 @@ def test_a_cell_that_is_left_at_rest_asks_for_place_and_rate_in_place_of_the_ene
         axis_table(funnel, gains),
         axis_table(funnel.select(np.array([1])), gains.select(np.array([1]))),
     )
-    assert axis_ready(table[0], NEXT_TABLE[0], 0.9, 0.05) == pytest.approx(0.75)
-    assert axis_ready(table[0], NEXT_TABLE[0], 0.88, 0.05) == pytest.approx(0.6)
-    assert axis_ready(table[0], NEXT_TABLE[0], 0.96, 0.0) < 0.0
-    assert axis_ready(table[0], NEXT_TABLE[0], 0.9, -0.21) < 0.0
-    assert axis_ready(alone[0], NEXT_TABLE[1], 0.0, 0.15) == pytest.approx(0.5)
+    assert readiness.axis_ready(table[0], NEXT_TABLE[0], 0.9, 0.05) == pytest.approx(0.75)
+    assert readiness.axis_ready(table[0], NEXT_TABLE[0], 0.88, 0.05) == pytest.approx(0.6)
+    assert readiness.axis_ready(table[0], NEXT_TABLE[0], 0.96, 0.0) < 0.0
+    assert readiness.axis_ready(table[0], NEXT_TABLE[0], 0.9, -0.21) < 0.0
+    assert readiness.axis_ready(alone[0], NEXT_TABLE[1], 0.0, 0.15) == pytest.approx(0.5)
 
 
 @pytest.mark.parametrize(
@@ -259,15 +243,19 @@ def test_a_robot_at_rest_in_the_middle_of_the_goal_is_ready_unless_one_condition
 
 def test_margins_by_hand():
     """Intervals count less a tenth of their width, clearance from half the inradius, energy to its bound."""
-    assert interval_margin(0.5, 0.0, 1.0) == 1.0
-    assert interval_margin(0.1, 0.0, 1.0) == pytest.approx(0.0, abs=1e-15)
-    assert interval_margin(0.9, -1.0, 1.0) < 0.0
-    assert interval_margin(0.9, -1.0, 1.0, 0.0) == pytest.approx(0.1)
+    assert readiness.interval_margin(0.5, 0.0, 1.0) == 1.0
+    assert readiness.interval_margin(0.1, 0.0, 1.0) == pytest.approx(0.0, abs=1e-15)
+    assert readiness.interval_margin(0.9, -1.0, 1.0) < 0.0
+    assert readiness.interval_margin(0.9, -1.0, 1.0, 0.0) == pytest.approx(0.1)
     floor = 0.5 * 100.0 * 0.15**2
-    assert [clearance_margin(share * floor, 100.0, 0.3) for share in (1.0, 2.0, -1.0)] == [
+    assert [readiness.clearance_margin(share * floor, 100.0, 0.3) for share in (1.0, 2.0, -1.0)] == [
         0.0, pytest.approx(0.5), pytest.approx(-2.0)
     ]  # fmt: skip
-    assert [funnel_margin(energy, 0.3) for energy in (0.3, 0.0, 0.6)] == [0.0, 1.0, pytest.approx(-0.5)]
+    assert [readiness.funnel_margin(energy, 0.3) for energy in (0.3, 0.0, 0.6)] == [
+        0.0,
+        1.0,
+        pytest.approx(-0.5),
+    ]
 
 
 def arrival(position=(5.0, 8.004), velocity=(0.0, 0.004), axes=(4.66, 0.3), rates=(0.01, 0.0)):
