@@ -40,7 +40,7 @@ from coop_drake.planning.planner import plan
 from coop_drake.tree.pose import FloatArray
 from coop_drake.typed_data import to_plain
 from coop_drake.verification import verify_plan, verify_proof
-from coop_drake.verification.runs.clearances import least_distances
+from coop_drake.verification.runs.bodies import least_distances
 
 MEASURED = "_seconds"
 """How names of columns end that a second answer to the same question does not repeat."""

@@ -62,7 +62,7 @@ class TreeJoint:
       (``finest_widths``), ``planning/rescaling.py`` and ``diagnosis/diagnosing.py``;
     - to the budget of a deployment: ``scenario/budget_file.py`` (errors of velocities);
     - independently of all these to ``checking/team.py``, and in ``verification/`` to ``question.py``,
-      ``kinematics.py``, ``gains.py`` and ``runs/mechanics.py``.
+      ``gains.py`` and ``runs/bodies.py``.
 
     Attributes:
         name: Scoped name, for example ``robot_0::elbow``.

@@ -20,7 +20,7 @@ from coop_drake.planning.duration import estimated
 from coop_drake.tree.component_tree import ComponentTree, usual_unit
 from coop_drake.tree.pose import FloatArray
 from coop_drake.verification.checks import Check
-from coop_drake.verification.kinematics import component_stages, levers
+from coop_drake.verification.runs.bodies import component_stages, levers
 from coop_drake.verification.runs.laws import SHAPES
 
 RELATIVE = 1e-9

@@ -20,7 +20,7 @@ from coop_drake.simulation import build_maps, simulate
 from coop_drake.verification import verify_file
 from coop_drake.verification.gains import check_accelerations, check_limits, check_speeds
 from coop_drake.verification.runs import verify_log
-from coop_drake.verification.runs.mechanics import check_run_efforts
+from coop_drake.verification.runs.bodies import check_run_efforts
 from coop_drake.verification.runs.rows import Rows
 from tests.support.run_checks import verified_run
 from tests.support.small_scenario import small_scenario

@@ -5,7 +5,6 @@ The block stands for the controllers, sensors, messages and actuators of a whole
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -45,10 +44,8 @@ from coop_drake.laws.axis_table import write_bounds
 from coop_drake.laws.measurements import period_of
 from coop_drake.plant import build_team_plant
 from coop_drake.plant.team import displacement
-from coop_drake.progress import Progress
 from coop_drake.scenario import Deployment, Scenario
 from coop_drake.simulation import run_loop
-from coop_drake.simulation.telemetry import Sample
 from coop_drake.systems import Block
 from coop_drake.systems.block import ALARM_SIZE
 from coop_drake.systems.departures import tilt_floor
@@ -71,19 +68,10 @@ def tell(
 ) -> None:  # fmt: skip
     """Write what the blocks of all robots and the cell planner would show now, before a sample's updates.
 
-    Args:
-        cells: The plan's cells.
-        team: The robots' models.
-        nominal: The nominal motions.
-        departures: What departs.
-        room: Room for what robots compute.
-        memory: What changes; it is changed as by a sample, so that it must be a copy.
-        sample: Number of the sample, or of the next one between two samples.
-        number: Number of the control period that ``now`` is in.
-        now: Time of the run [s].
-        instant: Receives index of the cell, time of its entry [s], 1 where the team has arrived, (3,).
-        shown: Receives what ``SHOWN`` lists of every robot, shape (N, ``SHOWN``).
-        bounds: Receives lower and upper bounds of the funnels of all axes, shape (2, M) [rad or m].
+    ``memory`` is changed as by a sample, so that it must be a copy; ``number`` is that of the control period
+    that ``now`` [s] is in. ``instant`` receives index of the cell, time of its entry [s] and 1 where the team
+    has arrived, (3,); ``shown`` what ``SHOWN`` lists of every robot, (N, ``SHOWN``); ``bounds`` the lower and
+    upper bounds of the funnels of all axes, (2, M) [rad or m].
     """
     current, robots = memory.current[sample % memory.current.shape[0]], team.yaws.size
     cell = int(current[0])
@@ -128,13 +116,6 @@ class SampledTeam(Block):
 
     State: one discrete group, updated every period: number of samples so far, time of the last one, then all
     fields of ``LoopMemory`` but the plant's state, one after the other.
-
-    Args:
-        cells: The plan's cells.
-        team: The robots' models.
-        nominal: The nominal motions.
-        departures: What departs.
-        memory: What is remembered at the start.
     """
 
     def __init__(
@@ -203,11 +184,7 @@ class SampledTeam(Block):
 
 @dataclass(frozen=True)
 class SampledLoop(Loop):
-    """Drake's plant, and one block that computes what a sampled team computes.
-
-    Attributes:
-        controllers: The block.
-    """
+    """Drake's plant, and one block that computes what a sampled team computes."""
 
     controllers: SampledTeam
 
@@ -235,15 +212,7 @@ class SampledLoop(Loop):
 
 
 def build_sampled_loop(transport: CompiledTransport, deployment: Deployment | None = None) -> SampledLoop:
-    """Build Drake's loop of a transport with one block in place of sensors, controllers and messages.
-
-    Args:
-        transport: What ``prepare`` returned.
-        deployment: The departures; None for those of the scenario that was prepared.
-
-    Raises:
-        ScenarioError: The compiled loop does not know what departs.
-    """
+    """Drake's loop of a transport with one block in place of sensors, controllers and messages."""
     deployment = transport.scenario.deployment if deployment is None else deployment
     departures = departures_of(transport, deployment)
     block = SampledTeam(
@@ -267,31 +236,12 @@ def build_sampled_loop(transport: CompiledTransport, deployment: Deployment | No
     return SampledLoop(builder.Build(), station, transport.plan, start, block)
 
 
-def simulate_sampled(
-    transport: CompiledTransport,
-    deployment: Deployment | None = None,
-    *,
-    progress: Progress | None = None,
-    observer: Callable[[Sample], None] | None = None,
-) -> SimulationLog:
-    """Run Drake's loop of a transport with one block in place of all controllers.
-
-    The log agrees with that of :func:`coop_drake.simulation.simulate` to rounding.
-
-    Args:
-        transport: What ``prepare`` returned.
-        deployment: The departures; None for those of the scenario that was prepared.
-        progress: Called with the stage and the fraction done, if given.
-        observer: Called with every accepted step, if given.
-
-    Raises:
-        ScenarioError: The compiled loop does not know what departs.
-    """
+def simulate_sampled(transport: CompiledTransport, deployment: Deployment | None = None) -> SimulationLog:
+    """The log of that loop, which agrees with that of ``simulate`` to rounding."""
     deployment = transport.scenario.deployment if deployment is None else deployment
-    scenario = replace(transport.scenario, deployment=deployment)
     loop = build_sampled_loop(transport, deployment)
     try:
-        return run_loop(loop, scenario, progress=progress, observer=observer)
+        return run_loop(loop, replace(transport.scenario, deployment=deployment))
     finally:
         loop.release()
 

@@ -8,8 +8,8 @@ the array, the index and the time:
    ``rows``.
 3. Every state lay in its cell and in its funnel; robots report what their states say, and cells were entered
    one by one when all were ready: ``laws``.
-4. Bases, wrenches and efforts go with the motion, bases and joints kept their limits: ``mechanics``.
-5. Nothing touched: ``clearances``.
+4. Bases, wrenches and efforts go with the motion, bases and joints kept their limits: ``bodies``.
+5. Nothing touched: ``bodies``.
 6. Nothing departed by more than a budget of the plan states. Delta E and reports are those of its nominal
    motions: ``budget``.
 
@@ -32,8 +32,15 @@ from coop_drake.errors import RefusalError
 from coop_drake.progress import Progress
 from coop_drake.tree.pose import FloatArray
 from coop_drake.verification.checks import Check, Verified
+from coop_drake.verification.runs.bodies import (
+    check_clearances,
+    check_grasps,
+    check_mechanics,
+    check_run_efforts,
+    check_run_speeds,
+    check_wrenches,
+)
 from coop_drake.verification.runs.budget import check_budget_used, check_nominal_reports
-from coop_drake.verification.runs.clearances import check_clearances
 from coop_drake.verification.runs.laws import (
     check_cells,
     check_clock,
@@ -43,13 +50,6 @@ from coop_drake.verification.runs.laws import (
     check_reference,
     check_reports,
     check_stated_funnels,
-)
-from coop_drake.verification.runs.mechanics import (
-    check_grasps,
-    check_mechanics,
-    check_run_efforts,
-    check_run_speeds,
-    check_wrenches,
 )
 from coop_drake.verification.runs.rows import Between, Rows, RunSetup, check_complete, check_motion
 
