@@ -8,22 +8,14 @@ from typing import Annotated
 
 import numpy as np
 
-from coop_drake.apart.messages import (
-    MOST_ROBOTS,
-    SUPERVISOR,
-    UNNUMBERED,
-    Channel,
-    Message,
-    Status,
-    Telemetry,
-)
+from coop_drake.apart import messages
 from coop_drake.errors import ScenarioError
 from coop_drake.laws.measurements import whole_periods
 from coop_drake.scenario.deployment import Delay, Probability
 from coop_drake.scenario.document import read_file
 from coop_drake.typed_data import Limits, NotNegative, Positive
 
-Robot = Annotated[int, Limits(at_least=0, at_most=MOST_ROBOTS - 1)]
+Robot = Annotated[int, Limits(at_least=0, at_most=messages.MOST_ROBOTS - 1)]
 """Index k of a robot."""
 
 
@@ -125,9 +117,9 @@ def load_faults(path: Path, robots: int) -> Faults:
     return faults
 
 
-_CHANNELS: tuple[Channel, ...] = ("sensors", "efforts", "team")
+_CHANNELS: tuple[messages.Channel, ...] = ("sensors", "efforts", "team")
 
-_ONLY_LOGGED = (Telemetry, Status)
+_ONLY_LOGGED = (messages.Telemetry, messages.Status)
 """Messages that a team without a log would not send."""
 
 
@@ -145,14 +137,16 @@ class Link:
         receiver: Index of the receiver.
     """
 
-    def __init__(self, channel: Channel, faults: Faults, period: float, sender: int, receiver: int) -> None:
+    def __init__(
+        self, channel: messages.Channel, faults: Faults, period: float, sender: int, receiver: int
+    ) -> None:
         self._faults: ChannelFaults = getattr(faults, channel)
         self._words = [faults.seed, _CHANNELS.index(channel), sender, receiver]
-        self._robot = sender if sender < SUPERVISOR else receiver
+        self._robot = sender if sender < messages.SUPERVISOR else receiver
         self._period, self._count = period, 0
         self.late_by = max(1, whole_periods(self._faults.late_by, period))
 
-    def fate(self, message: Message, sample: int) -> tuple[int, bool]:
+    def fate(self, message: messages.Message, sample: int) -> tuple[int, bool]:
         """Return how often a message is sent, and whether it is sent late.
 
         Args:
@@ -160,7 +154,7 @@ class Link:
             sample: Number of the present sample.
         """
         f = self._faults
-        opens = isinstance(message, UNNUMBERED) or sample == 0
+        opens = isinstance(message, messages.UNNUMBERED) or sample == 0
         if opens or isinstance(message, _ONLY_LOGGED) or not getattr(message, "step", True):
             return 1, False
         self._count += 1

@@ -14,51 +14,12 @@ from shapely import Point
 from shapely.ops import nearest_points
 
 from coop_drake.answers.budget import Budget
-from coop_drake.apart.messages import (
-    SUPERVISOR,
-    WORLD,
-    AtRest,
-    Begin,
-    Effort,
-    Hold,
-    HoldRequest,
-    Place,
-    Ready,
-    Sample,
-    Switch,
-    Telemetry,
-)
-from coop_drake.apart.node import (
-    AGAIN,
-    ASKS,
-    FOLLOWS,
-    HOLDS,
-    LASTING,
-    LATE,
-    LOSSY_REPORT_TIMEOUT,
-    MOST_WAITING,
-    MOVES,
-    OUTSIDE,
-    REPORT_TIMEOUT,
-    RETURNS,
-    STANDS,
-    NodeProcess,
-    SampledDiagram,
-    Stillness,
-    row_of,
-)
+from coop_drake.apart import messages as msg
+from coop_drake.apart import node as nodes
 from coop_drake.apart.transport import Ends
 from coop_drake.diagram.deployment import deploy
 from coop_drake.diagram.robot_controller import RobotKnowledge, build_robot_controller
-from coop_drake.laws.actuators import (
-    LONGEST_RETURN,
-    PULL,
-    RATE,
-    WIDEST_RETURN,
-    closed_after,
-    slow_motion,
-    slow_samples,
-)
+from coop_drake.laws import actuators
 from coop_drake.laws.axis_table import GOAL_LOWER, GOAL_UPPER, SLICE_LOWER, SLICE_UPPER, track_row
 from coop_drake.laws.measurements import period_of, whole_periods
 from coop_drake.laws.nominal import place_on_axes
@@ -71,7 +32,7 @@ from coop_drake.systems import axis_laws, robot_record
 from coop_drake.tree.component_tree import whole_turns
 from coop_drake.tree.pose import FloatArray
 
-Said = list[Ready | HoldRequest | AtRest]
+Said = list[msg.Ready | msg.HoldRequest | msg.AtRest]
 """What a robot tells the supervisor."""
 
 
@@ -189,7 +150,7 @@ class RobotNode:
     def __init__(self, knowledge: RobotKnowledge, deployment: Deployment, robot: int, name: str) -> None:
         controller = build_robot_controller(knowledge)
         self._deployed = deploy(controller, deployment, robot, name, bodiless=True)
-        self._controller, self._sampled = controller, SampledDiagram(self._deployed.diagram)
+        self._controller, self._sampled = controller, nodes.SampledDiagram(self._deployed.diagram)
         self.period, self._held = knowledge.period or 0.0, knowledge.hold is not None
         self._monitored = knowledge.monitored is not None
         self._joints = knowledge.joints.stop - knowledge.joints.start
@@ -200,15 +161,15 @@ class RobotNode:
         record = robot_record(self._joints, holds=self._held, monitored=self._monitored)
         self._logged = [name for name, size in record.items() if size]
         self._cell, self._hold_message = np.zeros(2), np.zeros(2)
-        self._said, self._reported, self._told_rest = Ready(0, False), inf, -inf
-        self.place, self.state = Place(True, 0, 0), FOLLOWS
+        self._said, self._reported, self._told_rest = msg.Ready(0, False), inf, -inf
+        self.place, self.state = msg.Place(True, 0, 0), nodes.FOLLOWS
         self.rest: FloatArray | None = None
-        self._order: Begin | None = None
+        self._order: msg.Begin | None = None
         self._slow: SlowMotion | None = None
         self._stays_until, self._doubted = 0, 0
         self._stamps = StampCheck(self.period, knowledge.plan.budget, knowledge.measured_age)
-        self._still = Stillness(self.period, LASTING)
-        self._timeout = self._samples_of(REPORT_TIMEOUT)
+        self._still = nodes.Stillness(self.period, nodes.LASTING)
+        self._timeout = self._samples_of(nodes.REPORT_TIMEOUT)
         self._number = 0
         endless = [3 + i for i, joint in enumerate(knowledge.robot.joints) if is_circle(joint)]
         self._circles = [self.state_size + 2, *endless]
@@ -236,11 +197,11 @@ class RobotNode:
 
     def forget(self) -> None:
         """Know no current cell: the process was started again during a run."""
-        self.place, self.state, self.rest = Place(False, 0, 0), ASKS, None
+        self.place, self.state, self.rest = msg.Place(False, 0, 0), nodes.ASKS, None
 
     def meet(self) -> None:
         """Tell the supervisor again what holds: it may be another process, which has heard nothing yet."""
-        self._said, self._reported, self._told_rest = Ready(self.place.cell, False), inf, -inf
+        self._said, self._reported, self._told_rest = msg.Ready(self.place.cell, False), inf, -inf
 
     def instant(self, time: float, sample: int) -> float:
         """Return the time for which the robot computes a sample [s].
@@ -261,7 +222,7 @@ class RobotNode:
             measured: Its own state, then the object's pose, as it measures them.
         """
         self._sampled.at(time, self._inputs(self._unwrapped(measured)))
-        return row_of(self._sampled, self._controller, self._logged)
+        return nodes.row_of(self._sampled, self._controller, self._logged)
 
     def step(
         self,
@@ -287,7 +248,7 @@ class RobotNode:
         self._doubted = self._doubted + 1 if doubts else 0
         longest = whole_periods(LONGEST_DOUBT, self.period) if self._held else 0
         if self._doubted > longest and self.place.known:
-            self.state, self._slow, self._order = LATE, None, None
+            self.state, self._slow, self._order = nodes.LATE, None, None
             return np.zeros(3 + self._joints), []
         measured = self._unwrapped(measured)
         if self.place.known and np.isfinite(measured).all():
@@ -297,25 +258,25 @@ class RobotNode:
         if self._slow is not None and not self._has_come(self._slow, time):
             return self._go_slowly(self._slow, time, measured), self._requests()
         self._sampled.at(time, self._inputs(measured))
-        brakes = self._monitored and row_of(self._sampled, self._controller, ["alarm"])[0] >= BRAKES
+        brakes = self._monitored and nodes.row_of(self._sampled, self._controller, ["alarm"])[0] >= BRAKES
         self._sampled.update()
         held = self._held and self._hold_message[0] > 0.0
-        self.state = STANDS if brakes else HOLDS if held else FOLLOWS
+        self.state = nodes.STANDS if brakes else nodes.HOLDS if held else nodes.FOLLOWS
         self.rest = self._rest()
         return self._sampled.output("robot_effort"), self._messages()
 
     def hear(self, messages: Iterable[Any]) -> None:
         """Take in what the supervisor says; it counts from the next instant on."""
         for message in messages:
-            if isinstance(message, Switch):
+            if isinstance(message, msg.Switch):
                 if self.place.known and message.cell > self.place.cell and self._number - message.sample > 1:
-                    self._timeout = self._samples_of(LOSSY_REPORT_TIMEOUT)
+                    self._timeout = self._samples_of(nodes.LOSSY_REPORT_TIMEOUT)
                 new = not self.place.known or message.sample > self.place.sample
                 if new and message.cell < len(self._tables):
                     self._enter(message.cell, message.sample)
-            elif isinstance(message, Hold):
+            elif isinstance(message, msg.Hold):
                 self._hold_message = np.array([message.held, message.number], dtype=float)
-            elif isinstance(message, Begin) and len(message.object_pose) == 3:
+            elif isinstance(message, msg.Begin) and len(message.object_pose) == 3:
                 self._order = message if message.cell < len(self._tables) else None
 
     def _samples_of(self, timeout: float) -> int:
@@ -323,15 +284,15 @@ class RobotNode:
         return max(2, whole_periods(timeout, self.period))
 
     def _enter(self, cell: int, sample: int) -> None:
-        if self.state == ASKS:
-            self.state, self._near = STANDS, np.mean(self._turns[cell], axis=0)
-        self.place, self._cell = Place(True, cell, sample), np.array([cell, sample * self.period])
+        if self.state == nodes.ASKS:
+            self.state, self._near = nodes.STANDS, np.mean(self._turns[cell], axis=0)
+        self.place, self._cell = msg.Place(True, cell, sample), np.array([cell, sample * self.period])
 
     def _moves(self, time: float, measured: FloatArray, *, stopped: bool) -> bool:
         """Whether the robot gives efforts in this sample, which it may begin anew now by an order."""
         number, order = self._number, self._order
         if not stopped or not self.place.known:
-            return self.state in MOVES
+            return self.state in nodes.MOVES
         if order is not None and number >= order.sample:
             self._order = None
             if number == order.sample and self._still.full:
@@ -340,7 +301,7 @@ class RobotNode:
                 return True
         return False
 
-    def _begin(self, order: Begin, time: float, measured: FloatArray) -> None:
+    def _begin(self, order: msg.Begin, time: float, measured: FloatArray) -> None:
         """Begin the cell of an order anew: set all states to rest, and choose the way.
 
         From a rest outside the cell the robot returns to it, which no plan has proved free.
@@ -354,12 +315,12 @@ class RobotNode:
         middle = 0.5 * (table[:, GOAL_LOWER] + table[:, GOAL_UPPER])
         ends = np.stack([axes, middle]), np.stack([pose[:2], target])
         self._slow = SlowMotion(order.sample, order.slow, *ends)
-        self.state = FOLLOWS if certified else RETURNS
+        self.state = nodes.FOLLOWS if certified else nodes.RETURNS
         wait = self._plan.restart.wait if self._plan.restart else 0.0
         self._stays_until = order.sample + order.slow + whole_periods(wait, self.period)
         self._sampled.at(time, self._inputs(measured))
         self._deployed.begin(self._sampled.context, order.cell, pose, joints)
-        self._said, self._reported, self._told_rest = Ready(order.cell, False), inf, -inf
+        self._said, self._reported, self._told_rest = msg.Ready(order.cell, False), inf, -inf
 
     def _holds(self, cell: int, axes: FloatArray, position: FloatArray) -> bool:
         """Whether the plan states that a cell can be begun anew from a rest, see ``answers/budget.py``."""
@@ -375,7 +336,7 @@ class RobotNode:
         table, restart = self._tables[cell], self._plan.restart
         way = np.abs(axes - 0.5 * (table[:, GOAL_LOWER] + table[:, GOAL_UPPER])).max()
         way = max(float(way), float(np.hypot(*(self._inside(cell, position) - position))))
-        return slow_samples(way, self.period, restart.rate / RATE if restart else 1.0)
+        return actuators.slow_samples(way, self.period, restart.rate / actuators.RATE if restart else 1.0)
 
     def _inside(self, cell: int, position: FloatArray, room: float = 0.0) -> FloatArray:
         """Return the point of a governed region, less a strip, that is nearest to a position [m]."""
@@ -388,9 +349,9 @@ class RobotNode:
 
     def _stand(self, measured: FloatArray) -> Said:
         """Wait; say where the object rests once it does, and which cells the robot can begin from there."""
-        if self.state not in (STANDS, OUTSIDE):
+        if self.state not in (nodes.STANDS, nodes.OUTSIDE):
             self._still.restart()
-        self.state, self._slow = STANDS, None
+        self.state, self._slow = nodes.STANDS, None
         rates, joints = measured[3 + self._joints : self.state_size], measured[3 : 3 + self._joints]
         seen = np.concatenate([joints, measured[self.state_size :]])
         if not self._still.sees_rest(rates, seen):
@@ -400,22 +361,22 @@ class RobotNode:
         width = table[:, SLICE_UPPER] - table[:, SLICE_LOWER]
         outside = np.maximum(table[:, SLICE_LOWER] - axes, axes - table[:, SLICE_UPPER])
         back = float(np.hypot(*(self._inside(self.place.cell, position) - position)))
-        if (outside > WIDEST_RETURN * width).any() or back > LONGEST_RETURN:
-            self.state = OUTSIDE
+        if (outside > actuators.WIDEST_RETURN * width).any() or back > actuators.LONGEST_RETURN:
+            self.state = nodes.OUTSIDE
             return []
-        if self._number - self._told_rest < whole_periods(AGAIN, self.period):
+        if self._number - self._told_rest < whole_periods(nodes.AGAIN, self.period):
             return []
         self._told_rest = self._number
         near = [c for c in range(self.place.cell - 1, self.place.cell + 2) if 0 <= c < len(self._tables)]
         cells = tuple(cell for cell in near if self._holds(cell, axes, position))
         needed = max(self._way(cell, axes, position) for cell in {*cells, self.place.cell})
-        return [AtRest(self._number, cells, needed, tuple(float(part) for part in mean[-3:]))]
+        return [msg.AtRest(self._number, cells, needed, tuple(float(part) for part in mean[-3:]))]
 
     def _has_come(self, slow: SlowMotion, time: float) -> bool:
         """Whether the slow way is over: from now on the cell's law acts, with funnels that are closed."""
         if self._number < slow.begin + slow.samples:
             return False
-        self._slow, self._cell[1] = None, time - closed_after(self._tables[self.place.cell])
+        self._slow, self._cell[1] = None, time - actuators.closed_after(self._tables[self.place.cell])
         return True
 
     def _go_slowly(self, slow: SlowMotion, time: float, measured: FloatArray) -> FloatArray:
@@ -428,16 +389,16 @@ class RobotNode:
         self._sampled.at(time, self._inputs(measured) | released)
         x, v = self._moving(root, measured)
         lag = self._plan.budget.lag if self._plan.budget else 0.0
-        wanted, rate, _ = slow_motion(slow.axes, since, duration)
-        ahead = slow_motion(slow.axes, since + 0.5 * T + lag, duration)[2]
-        command = ahead - PULL[0] * (x - wanted) - PULL[1] * (v - rate)
+        wanted, rate, _ = actuators.slow_motion(slow.axes, since, duration)
+        ahead = actuators.slow_motion(slow.axes, since + 0.5 * T + lag, duration)[2]
+        command = ahead - actuators.PULL[0] * (x - wanted) - actuators.PULL[1] * (v - rate)
         own = [track_row(row, 0.0, *state)[0] for row, *state in zip(table, x, v, strict=True)]
         self._deployed.command_axes(root, self.place.cell, command - own)
-        if self._monitored and self.state == FOLLOWS:
-            brakes = row_of(self._sampled, self._controller, ["alarm"])[0] >= BRAKES
-            self.state = STANDS if brakes else FOLLOWS
+        if self._monitored and self.state == nodes.FOLLOWS:
+            brakes = nodes.row_of(self._sampled, self._controller, ["alarm"])[0] >= BRAKES
+            self.state = nodes.STANDS if brakes else nodes.FOLLOWS
         self._sampled.update()
-        self._deployed.keep_position(root, slow_motion(slow.position, since + T, duration)[0])
+        self._deployed.keep_position(root, actuators.slow_motion(slow.position, since + T, duration)[0])
         self.rest = self._rest()
         return self._sampled.output("robot_effort")
 
@@ -488,22 +449,22 @@ class RobotNode:
         stays = self._number < self._stays_until or self._doubted > 0
         ready = index == cell and margin >= 0.0 and not stays
         again = self._said.cell == cell and self._number - self._reported >= self._timeout
-        if again or ready != (self._said == Ready(cell, True)):
-            self._said, self._reported = Ready(cell, bool(ready)), self._number
+        if again or ready != (self._said == msg.Ready(cell, True)):
+            self._said, self._reported = msg.Ready(cell, bool(ready)), self._number
             said.append(self._said)
         return said + self._requests()
 
     def _requests(self) -> Said:
         """Return the robot's request that the team be held, where the scenario has holds."""
         asks, number = self._sampled.output("hold_request") if self._held else (0.0, -1.0)
-        return [HoldRequest(bool(asks > 0.0) or self._doubted > 0, int(number))] if number >= 0.0 else []
+        return [msg.HoldRequest(bool(asks > 0.0) or self._doubted > 0, int(number))] if number >= 0.0 else []
 
     def release(self) -> None:
         """Free all memory."""
         self._sampled.release()
 
 
-class RobotProcess(NodeProcess):
+class RobotProcess(nodes.NodeProcess):
     """Answers the world for one robot.
 
     In a session with the supervisor that begins while a run is under way, it first says which cell it is in,
@@ -515,27 +476,31 @@ class RobotProcess(NodeProcess):
     """
 
     def __init__(self, node: RobotNode, ends: Ends) -> None:
-        super().__init__(ends, [SUPERVISOR])
-        self._node, self._team = node, ends.sessions[SUPERVISOR]
+        super().__init__(ends, [msg.SUPERVISOR])
+        self._node, self._team = node, ends.sessions[msg.SUPERVISOR]
         self._placed, self._placing = 0, -inf
         self._stepped: int | None = None
         self._measured, self._stamps = np.zeros(0), (0.0, 0.0)
 
-    def _objection(self, question: Sample) -> str:
+    def _objection(self, question: msg.Sample) -> str:
         if len(question.object_pose) != 3 or len(question.robot_state) != self._node.state_size:
             return f"Expected 3 numbers of the object and {self._node.state_size} of the robot"
         missed = 0 if self._stepped is None else question.number - self._stepped
-        return "" if missed <= MOST_WAITING else f"Expected a number up to {MOST_WAITING} after the last"
+        return (
+            ""
+            if missed <= nodes.MOST_WAITING
+            else f"Expected a number up to {nodes.MOST_WAITING} after the last"
+        )
 
-    def _counts(self, question: Sample) -> Mapping[int, int]:
-        return {SUPERVISOR: question.team_messages}
+    def _counts(self, question: msg.Sample) -> Mapping[int, int]:
+        return {msg.SUPERVISOR: question.team_messages}
 
     def _hear(self, sender: int, message: Any) -> None:
-        if isinstance(message, Switch):
+        if isinstance(message, msg.Switch):
             self._placed = self._team.count
         self._node.hear([message])
 
-    def _begin(self, question: Sample) -> None:
+    def _begin(self, question: msg.Sample) -> None:
         if question.number == 0:
             self._placed = self._team.count
         else:
@@ -544,13 +509,13 @@ class RobotProcess(NodeProcess):
     def _say_place(self) -> None:
         """Say which cell this is, where the supervisor may not know, and not a moment ago."""
         now = monotonic()
-        if self._placed == self._team.count or now - self._placing < AGAIN:
+        if self._placed == self._team.count or now - self._placing < nodes.AGAIN:
             return
-        if self._ends.send(SUPERVISOR, self._node.place):
+        if self._ends.send(msg.SUPERVISOR, self._node.place):
             self._placing = now
             self._node.meet()
 
-    def _answer(self, question: Sample) -> None:
+    def _answer(self, question: msg.Sample) -> None:
         number, time, node, ends = question.number, question.time, self._node, self._ends
         measured = np.array([*question.robot_state, *question.object_pose])
         ends.sample = number
@@ -559,16 +524,16 @@ class RobotProcess(NodeProcess):
         if question.step:
             effort, said = self._steps(question, measured)
             for message in said:
-                ends.send(SUPERVISOR, message)
+                ends.send(msg.SUPERVISOR, message)
             rest = () if node.rest is None else tuple(node.rest.tolist())
-            stamp, sent = min(question.pose_stamp, question.state_stamp), ends.sent(SUPERVISOR)
-            ends.send(WORLD, Effort(number, stamp, sent, node.state, tuple(effort.tolist()), rest))
+            stamp, sent = min(question.pose_stamp, question.state_stamp), ends.sent(msg.SUPERVISOR)
+            ends.send(msg.WORLD, msg.Effort(number, stamp, sent, node.state, tuple(effort.tolist()), rest))
         # What the log shows comes last: then the world knows that there is no effort if none has come.
-        sent, refused = ends.sent(SUPERVISOR), ends.refusals.total
-        ends.send(WORLD, Telemetry(number, time, sent, node.state, refused, shown))
+        sent, refused = ends.sent(msg.SUPERVISOR), ends.refusals.total
+        ends.send(msg.WORLD, msg.Telemetry(number, time, sent, node.state, refused, shown))
         ends.release()
 
-    def _steps(self, question: Sample, measured: FloatArray) -> tuple[FloatArray, Said]:
+    def _steps(self, question: msg.Sample, measured: FloatArray) -> tuple[FloatArray, Said]:
         """Compute a sample, and before it with the last measurements those of which nothing was heard."""
         said: Said = []
         missed = 0 if self._stepped is None or question.stopped else question.number - self._stepped - 1

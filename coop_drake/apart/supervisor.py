@@ -8,18 +8,7 @@ from typing import Any
 import numpy as np
 from pydrake.systems.framework import DiagramBuilder
 
-from coop_drake.apart.messages import (
-    WORLD,
-    AtRest,
-    Begin,
-    Hold,
-    HoldRequest,
-    Place,
-    Ready,
-    Status,
-    Switch,
-    Tick,
-)
+from coop_drake.apart import messages as msg
 from coop_drake.apart.node import AHEAD, LOSSY_COPIES, NodeProcess, SampledDiagram
 from coop_drake.apart.transport import Ends
 from coop_drake.diagram.closed_loop import add_supervisor
@@ -68,9 +57,9 @@ class SupervisorNode:
         self._logged = ("current_cell", "arrived", *(["causes"] if self._held else []))
         subjects = ("ready", *(["request"] if self._held else []))
         self._heard = {f"robot_{k}_{subject}": _NOTHING for k in range(robots) for subject in subjects}
-        self._planner, self._place = planner, Place(True, 0, 0)
-        self._places, self._resting = dict[int, Place](), dict[int, AtRest]()
-        self._order: Begin | None = None
+        self._planner, self._place = planner, msg.Place(True, 0, 0)
+        self._places, self._resting = dict[int, msg.Place](), dict[int, msg.AtRest]()
+        self._order: msg.Begin | None = None
         self._stopped, self._lossy, self._since, self._number = False, False, 0, 0
 
     @property
@@ -80,12 +69,12 @@ class SupervisorNode:
 
     def forget(self) -> None:
         """Know no current cell: the process was started again during a run."""
-        self._place = Place(False, 0, 0)
+        self._place = msg.Place(False, 0, 0)
 
-    def _switch(self) -> Switch:
-        return Switch(self._place.cell, self._place.sample)
+    def _switch(self) -> msg.Switch:
+        return msg.Switch(self._place.cell, self._place.sample)
 
-    def answers(self) -> list[tuple[int, Switch]]:
+    def answers(self) -> list[tuple[int, msg.Switch]]:
         """Return robots that have said which cell they are in, and what to answer; none until it knows it.
 
         A supervisor that does not know waits for all robots. They may differ where the one before it ended
@@ -106,14 +95,14 @@ class SupervisorNode:
         state = self._planner.GetMyMutableContextFromRoot(sampled.context).get_mutable_discrete_state_vector()
         state.SetFromVector([cell, sample * self._period])
         self._heard = dict.fromkeys(self._heard, _NOTHING)
-        self._place = Place(True, cell, sample)
+        self._place = msg.Place(True, cell, sample)
 
     def look(self, time: float) -> FloatArray:
         """Return the supervisor's record for the log at an instant [s]; nothing changes."""
         self._sampled.at(time, self._heard)
         return np.concatenate([self._sampled.output(name) for name in self._logged])
 
-    def step(self, time: float, *, stopped: bool = False) -> list[Switch | Hold | Begin]:
+    def step(self, time: float, *, stopped: bool = False) -> list[msg.Switch | msg.Hold | msg.Begin]:
         """Compute a sample, and return what all robots are told.
 
         Args:
@@ -132,19 +121,19 @@ class SupervisorNode:
             return self._gathered(number)
         self._sampled.at(time, self._heard)
         self._sampled.update()
-        said: list[Switch | Hold | Begin] = []
+        said: list[msg.Switch | msg.Hold | msg.Begin] = []
         cell, entry = self._sampled.output("current_cell")
         if int(cell) != self._place.cell:
-            self._place = Place(True, int(cell), round(entry / self._period))
+            self._place = msg.Place(True, int(cell), round(entry / self._period))
             said.append(self._switch())
         elif self._lossy and 0 < number - self._place.sample <= LOSSY_COPIES:
             said.append(self._switch())
         if self._held:
             held, number = self._sampled.output("hold_message")
-            said.append(Hold(bool(held), int(number)))
+            said.append(msg.Hold(bool(held), int(number)))
         return said
 
-    def _gathered(self, number: int) -> list[Switch | Hold | Begin]:
+    def _gathered(self, number: int) -> list[msg.Switch | msg.Hold | msg.Begin]:
         """Return the order to begin, once all robots have said that they rest since the drives brake.
 
         The cell is one that holds all robots, the present one where it does.
@@ -162,24 +151,24 @@ class SupervisorNode:
         slow = max(one.needed for one in told) + SPARE
         common = set.intersection(*({*one.cells} for one in told)) & {*range(self._cells)}
         cell = min(common, key=lambda c: (abs(c - self._place.cell), c), default=self._place.cell)
-        self._order = Begin(cell, sample, slow, pose)
+        self._order = msg.Begin(cell, sample, slow, pose)
         return [self._order]
 
     def hear(self, robot: int, messages: Iterable[Any]) -> None:
         """Take in what a robot says; it counts from the next instant on."""
         for message in messages:
-            if isinstance(message, Ready):
+            if isinstance(message, msg.Ready):
                 self._heard[f"robot_{robot}_ready"] = np.array([message.cell, 0.0 if message.ready else -1.0])
                 # In the first sample of a cell, reports of the cell before are still under way.
                 missed = message.cell < self._place.cell and self._number - self._place.sample > 1
                 if self.knows and missed:
                     self._lossy = True
-                    self._places[robot] = Place(True, message.cell, 0)
-            elif isinstance(message, HoldRequest):
+                    self._places[robot] = msg.Place(True, message.cell, 0)
+            elif isinstance(message, msg.HoldRequest):
                 self._heard[f"robot_{robot}_request"] = np.array([message.asks, message.number], dtype=float)
-            elif isinstance(message, Place) and message.cell < self._cells:
+            elif isinstance(message, msg.Place) and message.cell < self._cells:
                 self._places[robot] = message
-            elif isinstance(message, AtRest) and len(message.object_pose) == 3:
+            elif isinstance(message, msg.AtRest) and len(message.object_pose) == 3:
                 self._resting[robot] = message
 
     def release(self) -> None:
@@ -200,21 +189,21 @@ class SupervisorProcess(NodeProcess):
         super().__init__(ends, range(robots))
         self._node, self._robots = node, range(robots)
 
-    def _objection(self, question: Tick) -> str:
+    def _objection(self, question: msg.Tick) -> str:
         robots = len(self._robots)
         return "" if len(question.team_messages) == robots else f"Expected {robots} numbers of messages"
 
-    def _counts(self, question: Tick) -> Mapping[int, int]:
+    def _counts(self, question: msg.Tick) -> Mapping[int, int]:
         return dict(enumerate(question.team_messages))
 
     def _hear(self, sender: int, message: Any) -> None:
         self._node.hear(sender, [message])
 
-    def _begin(self, question: Tick) -> None:
+    def _begin(self, question: msg.Tick) -> None:
         if question.number > 0:
             self._node.forget()
 
-    def _answer(self, question: Tick) -> None:
+    def _answer(self, question: msg.Tick) -> None:
         number, time, node, ends = question.number, question.time, self._node, self._ends
         ends.sample = number
         for robot, answer in node.answers():
@@ -226,6 +215,6 @@ class SupervisorProcess(NodeProcess):
                     ends.send(robot, message)
         sent, codes = tuple(map(ends.sent, self._robots)), tuple(map(int, causes))
         refused = ends.refusals.total
-        status = Status(number, time, node.knows, sent, int(cell), entry, bool(arrived), codes, refused)
-        ends.send(WORLD, status)
+        status = msg.Status(number, time, node.knows, sent, int(cell), entry, bool(arrived), codes, refused)
+        ends.send(msg.WORLD, status)
         ends.release()

@@ -15,31 +15,12 @@ import zmq
 import zmq.utils.monitor
 from zmq.auth.thread import ThreadAuthenticator
 
+from coop_drake.apart import messages
 from coop_drake.apart.faults import NO_FAULTS, ChannelFaults, Faults, Link
-from coop_drake.apart.messages import (
-    LONGEST,
-    PROTOCOL,
-    SUPERVISOR,
-    UNNUMBERED,
-    WORLD,
-    Hello,
-    Message,
-    Reason,
-    Refusals,
-    Refused,
-    RefusedError,
-    Welcome,
-    channel_of,
-    decode,
-    decoder_of,
-    encode,
-    name_of,
-    protocol_of,
-)
 from coop_drake.apart.team_files import AddressBook, KeyPair
 from coop_drake.errors import MessagingError
 
-Received = tuple[int, Message]
+Received = tuple[int, messages.Message]
 """Index of a sender and its message."""
 
 _HIGH_WATER = 1000
@@ -84,7 +65,7 @@ class Network:
 
     def link(self, sender: int, receiver: int) -> Link | None:
         """Return what goes wrong with messages from one process to another, None for nothing."""
-        channel = channel_of(sender, receiver)
+        channel = messages.channel_of(sender, receiver)
         sound = getattr(self.faults, channel) == ChannelFaults()
         return None if sound else Link(channel, self.faults, self.period, sender, receiver)
 
@@ -112,18 +93,18 @@ class Session:
         self.number, self.open, self.sent = number, is_open, 0
         self.count += is_open
         self._numbered = self._newest = self._taken = 0
-        self._late: list[tuple[int, int, Message, bytes]] = []
+        self._late: list[tuple[int, int, messages.Message, bytes]] = []
 
-    def tell(self, message: Message) -> bool:
+    def tell(self, message: messages.Message) -> bool:
         """Send a message about the session itself; False where the connection does not take it."""
-        return self._put(encode(self.number, 0, message))
+        return self._put(messages.encode(self.number, 0, message))
 
-    def send(self, message: Message, sample: int) -> bool:
+    def send(self, message: messages.Message, sample: int) -> bool:
         """Send a message at a sample; False where it is not sent now, or there is no session."""
-        if not self.open or isinstance(message, UNNUMBERED):
+        if not self.open or isinstance(message, messages.UNNUMBERED):
             return self.open and self.tell(message)
         number = self._numbered + 1
-        data = encode(self.number, number, message)
+        data = messages.encode(self.number, number, message)
         copies, late = (1, False) if self._link is None else self._link.fate(message, sample)
         if late and copies and self._link is not None:
             self._late.append((sample + self._link.late_by, number, message, data))
@@ -148,7 +129,7 @@ class Session:
             RefusedError: The number has been passed.
         """
         if number <= self._taken:
-            raise RefusedError(Reason.SEQUENCE)
+            raise messages.RefusedError(messages.Reason.SEQUENCE)
         self._taken = number
 
     def _passed(self, number: int) -> bool:
@@ -169,14 +150,14 @@ class _Socket:
         events: Which events count beside those of connections that fail.
     """
 
-    def __init__(self, keys: KeyPair | None, refusals: Refusals, kind: int, events: int = 0) -> None:
+    def __init__(self, keys: KeyPair | None, refusals: messages.Refusals, kind: int, events: int = 0) -> None:
         self._refusals = refusals
         self._context = zmq.Context()
         self._socket: zmq.Socket[bytes] = self._context.socket(kind)
         self._socket.set_hwm(_HIGH_WATER)
         for option, value in (
             (zmq.LINGER, 2000),
-            (zmq.MAXMSGSIZE, LONGEST),
+            (zmq.MAXMSGSIZE, messages.LONGEST),
             (zmq.HEARTBEAT_IVL, _ALIVE),
             (zmq.HEARTBEAT_TIMEOUT, _DEAD),
             (zmq.RECONNECT_IVL, 20),
@@ -246,10 +227,10 @@ class Server(_Socket):
         sessions: Sessions with all processes that it knows, by their indices.
     """
 
-    def __init__(self, network: Network, index: int, refusals: Refusals) -> None:
+    def __init__(self, network: Network, index: int, refusals: messages.Refusals) -> None:
         super().__init__(network.keys, refusals, zmq.ROUTER)
         self._network, self._index, book = network, index, network.book
-        clients = [*range(len(book.robots)), *([SUPERVISOR] if index == WORLD else [])]
+        clients = [*range(len(book.robots)), *([messages.SUPERVISOR] if index == messages.WORLD else [])]
         self.sessions = {k: Session(partial(self._to, k), network.link(index, k)) for k in clients}
         self._connected, self._routes = dict[bytes, int](), dict[int, bytes]()
         self._socket.setsockopt(zmq.ROUTER_MANDATORY, 1)
@@ -272,12 +253,12 @@ class Server(_Socket):
     def poll(self) -> Received | None:
         """Return a sender and its message, first the ``Hello`` of its session; None for nothing."""
         for _ in self._events():
-            self._refusals.add(RefusedError(Reason.HANDSHAKE))
+            self._refusals.add(messages.RefusedError(messages.Reason.HANDSHAKE))
         for frames in self._frames():
             try:
                 if (taken := self._take(frames)) is not None:
                     return taken
-            except RefusedError as refused:
+            except messages.RefusedError as refused:
                 self._refusals.add(refused)
         return None
 
@@ -295,17 +276,19 @@ class Server(_Socket):
             RefusedError: The message is refused.
         """
         if len(frames) != 2:
-            raise RefusedError(Reason.MALFORMED, f"Expected one frame, got {len(frames) - 1} or more")
+            raise messages.RefusedError(
+                messages.Reason.MALFORMED, f"Expected one frame, got {len(frames) - 1} or more"
+            )
         route, data = frames[0].bytes, frames[1].bytes
         index = self._connected.get(route)
         if index is None:
             return self._greet(route, data, frames[1])
         session = self.sessions[index]
-        own, number, message = decode(data, decoder_of(index, self._index))
+        own, number, message = messages.decode(data, messages.decoder_of(index, self._index))
         if own != session.number:
-            raise RefusedError(Reason.SESSION)
-        if isinstance(message, Hello):  # It has asked again before it has read the answer.
-            session.tell(Welcome())
+            raise messages.RefusedError(messages.Reason.SESSION)
+        if isinstance(message, messages.Hello):  # It has asked again before it has read the answer.
+            session.tell(messages.Welcome())
             return None
         session.take(number)
         return index, message
@@ -316,39 +299,39 @@ class Server(_Socket):
         Raises:
             RefusedError: It gets none.
         """
-        opening = protocol_of(data)
+        opening = messages.protocol_of(data)
         if opening is None:
-            raise RefusedError(Reason.SESSION)
+            raise messages.RefusedError(messages.Reason.SESSION)
         number, protocol = opening
 
-        def refuse(reason: Reason, words: str) -> RefusedError:
-            self._put((route, encode(number, 0, Refused(words))))
-            return RefusedError(reason)
+        def refuse(reason: messages.Reason, words: str) -> messages.RefusedError:
+            self._put((route, messages.encode(number, 0, messages.Refused(words))))
+            return messages.RefusedError(reason)
 
-        if protocol != PROTOCOL:
-            raise refuse(Reason.VERSION, f"it speaks protocol {PROTOCOL}, not {protocol}")
-        _, _, hello = decode(data)
+        if protocol != messages.PROTOCOL:
+            raise refuse(messages.Reason.VERSION, f"it speaks protocol {messages.PROTOCOL}, not {protocol}")
+        _, _, hello = messages.decode(data)
         sender: int = hello.sender
         if sender not in self.sessions:
-            raise refuse(Reason.SENDER, "it knows no process of this name")
+            raise refuse(messages.Reason.SENDER, "it knows no process of this name")
         if self._keeper is not None and frame.get("User-Id") != self._network.book.key_of(sender):
-            raise refuse(Reason.SENDER, "its address book has another key for this name")
+            raise refuse(messages.Reason.SENDER, "its address book has another key for this name")
         for differs, words in (
             (hello.scenario != self._network.scenario, "it has another scenario"),
             (hello.plan != self._network.plan, "it has another plan"),
             (self._is_there(sender), "another process of this name is connected"),
         ):
             if differs:
-                raise refuse(Reason.SESSION, words)
+                raise refuse(messages.Reason.SESSION, words)
         self._connected[route], self._routes[sender] = sender, route
         self.sessions[sender].begin(number, is_open=True)
-        self.sessions[sender].tell(Welcome())
+        self.sessions[sender].tell(messages.Welcome())
         return sender, hello
 
     def _is_there(self, index: int) -> bool:
         """Whether the connection of a process is there; the library notices within two seconds if not."""
         session = self.sessions[index]
-        return session.open and (session.tell(Welcome()) or session.open)
+        return session.open and (session.tell(messages.Welcome()) or session.open)
 
     def _to(self, index: int, data: bytes) -> bool:
         """Send bytes to a process; False where its connection is full, or gone, and the session with it."""
@@ -388,13 +371,13 @@ class Client(_Socket):
         trouble: Why there is none, where there is none.
     """
 
-    def __init__(self, network: Network, index: int, server: int, refusals: Refusals) -> None:
+    def __init__(self, network: Network, index: int, server: int, refusals: messages.Refusals) -> None:
         connections = zmq.Event.HANDSHAKE_SUCCEEDED | zmq.Event.DISCONNECTED
         super().__init__(network.keys, refusals, zmq.DEALER, connections)
         self.address, self.trouble = network.book.listener(server).address, "nothing answers there"
         self.session = Session(lambda data: self._put((data,)), network.link(index, server))
-        self._server, self._decoder = server, decoder_of(server, index)
-        self._hello = Hello(PROTOCOL, index, network.scenario, network.plan)
+        self._server, self._decoder = server, messages.decoder_of(server, index)
+        self._hello = messages.Hello(messages.PROTOCOL, index, network.scenario, network.plan)
         self._happened = list[zmq.Event]()
         self._restart()
         if (key := network.book.key_of(server)) is not None:
@@ -419,11 +402,11 @@ class Client(_Socket):
             try:
                 if (message := self._take(frames)) is not None:
                     return self._server, message
-            except RefusedError as refused:
+            except messages.RefusedError as refused:
                 self._refusals.add(refused)
         for event in self._happened:
             if event & _FAILURES:
-                self._refusals.add(RefusedError(Reason.HANDSHAKE))
+                self._refusals.add(messages.RefusedError(messages.Reason.HANDSHAKE))
                 self.trouble = "the connection was refused: a key is missing or wrong"
             elif event == zmq.Event.DISCONNECTED:
                 self._restart()
@@ -442,19 +425,19 @@ class Client(_Socket):
             RefusedError: The message is refused.
         """
         if len(frames) != 1:
-            raise RefusedError(Reason.MALFORMED, "Expected one frame, got several")
-        own, number, message = decode(frames[0].bytes, self._decoder)
-        session, opens = self.session, isinstance(message, Welcome | Refused)
+            raise messages.RefusedError(messages.Reason.MALFORMED, "Expected one frame, got several")
+        own, number, message = messages.decode(frames[0].bytes, self._decoder)
+        session, opens = self.session, isinstance(message, messages.Welcome | messages.Refused)
         if own != session.number or not (session.open or opens):
-            raise RefusedError(Reason.SESSION)
-        if isinstance(message, Refused):
+            raise messages.RefusedError(messages.Reason.SESSION)
+        if isinstance(message, messages.Refused):
             self.trouble = message.reason
-        if isinstance(message, Welcome) and not session.open:
+        if isinstance(message, messages.Welcome) and not session.open:
             session.begin(own, is_open=True)
             return message
         if opens:
             return None
-        if not isinstance(message, UNNUMBERED):
+        if not isinstance(message, messages.UNNUMBERED):
             session.take(number)
         return message
 
@@ -474,11 +457,19 @@ class Ends:
     """
 
     def __init__(self, network: Network, index: int) -> None:
-        self.sample, self._arrived, self.refusals = 0, deque[Received](), Refusals(name_of(index))
-        self.clients = {k: Client(network, index, k, self.refusals) for k in (WORLD, SUPERVISOR) if k > index}
+        self.sample, self._arrived, self.refusals = (
+            0,
+            deque[Received](),
+            messages.Refusals(messages.name_of(index)),
+        )
+        self.clients = {
+            k: Client(network, index, k, self.refusals)
+            for k in (messages.WORLD, messages.SUPERVISOR)
+            if k > index
+        }
         self.sessions = {k: client.session for k, client in self.clients.items()}
         self._all: list[Server | Client] = [*self.clients.values()]
-        if index in (WORLD, SUPERVISOR):
+        if index in (messages.WORLD, messages.SUPERVISOR):
             self._all.append(server := Server(network, index, self.refusals))
             self.sessions |= server.sessions
         self._poller, self._owners = zmq.Poller(), dict[Any, Server | Client]()
@@ -487,7 +478,7 @@ class Ends:
                 self._poller.register(socket, zmq.POLLIN)
                 self._owners[socket] = end
 
-    def send(self, index: int, message: Message) -> bool:
+    def send(self, index: int, message: messages.Message) -> bool:
         """Send a message to a process; False where it has no session, does not take it or will not get it."""
         return self.sessions[index].send(message, self.sample)
 
@@ -536,7 +527,7 @@ class Ends:
         while words := self._missing():
             left = deadline - time.monotonic()
             if gone := ended():
-                names = ", ".join(name_of(index) for index in sorted(gone))
+                names = ", ".join(messages.name_of(index) for index in sorted(gone))
                 raise MessagingError(f"the process of {names} ended before the start")
             if left <= 0.0:
                 raise MessagingError(f"{words} (waited for {limit:g} s)")
@@ -549,7 +540,9 @@ class Ends:
 
     def _missing(self) -> str:
         """Say with whom there are no sessions yet: servers, or where this is the world all others."""
-        missing = [(name_of(k), k) for k in sorted((self.clients or self.sessions).keys() - self.present())]
+        missing = [
+            (messages.name_of(k), k) for k in sorted((self.clients or self.sessions).keys() - self.present())
+        ]
         if not self.clients:
             return "no message came from " + ", ".join(name for name, _ in missing) if missing else ""
         known = self.clients

@@ -9,20 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from coop_drake.apart import REJOIN
+from coop_drake.apart import REJOIN, messages
 from coop_drake.apart.membership import TOLERATED, Membership, Processes
-from coop_drake.apart.messages import (
-    SUPERVISOR,
-    Effort,
-    Reason,
-    RefusedError,
-    Sample,
-    Status,
-    Telemetry,
-    Tick,
-    Welcome,
-    name_of,
-)
 from coop_drake.apart.node import ASKS, FOLLOWS, MOVES, RETURNS, STATES, TURN, Stillness
 from coop_drake.apart.transport import Ends, Network
 from coop_drake.errors import MessagingError
@@ -147,7 +135,7 @@ class SampleExchange:
     ) -> None:
         self._ends, self._patience, self._before, self._pacing = ends, patience, before, pacing
         self._cells = cells
-        self._everyone, self._period = [*range(len(network.book.robots)), SUPERVISOR], network.period
+        self._everyone, self._period = [*range(len(network.book.robots)), messages.SUPERVISOR], network.period
         self.report, self._every = report, max(1, round(_REPORTED / network.period))
         self._clock, self._oldest = network.faults.clock, oldest + _ROUNDING
         self.membership = Membership(
@@ -181,12 +169,14 @@ class SampleExchange:
 
     def _process_facts(self, index: int) -> dict[str, Any]:
         """Return what a run reports about one process."""
-        shown = self._last.get((index, Status if index == SUPERVISOR else Telemetry))
+        shown = self._last.get(
+            (index, messages.Status if index == messages.SUPERVISOR else messages.Telemetry)
+        )
         state, since = STATES[self._states.get(index, FOLLOWS)], self.missing.get(index)
-        there = "there" if index == SUPERVISOR else state
+        there = "there" if index == messages.SUPERVISOR else state
         missing = "gone" if index in self.membership.gone() else "silent"
         return {
-            "name": name_of(index),
+            "name": messages.name_of(index),
             "state": there if since is None else missing,
             "missing_since": since,
             "team_messages": 0 if shown is None else int(np.sum(shown.team_messages)),
@@ -212,12 +202,15 @@ class SampleExchange:
         elif not self.trouble():
             self._stamps = [np.full(2, time) for _ in measured] if stamps is None else stamps
             self._ask(time, measured, step=False)
-        needed = {(SUPERVISOR, Status), *((k, Telemetry) for k in self._everyone[:-1])}
+        needed = {
+            (messages.SUPERVISOR, messages.Status),
+            *((k, messages.Telemetry) for k in self._everyone[:-1]),
+        }
         if not needed <= self._last.keys():
             self.membership.give_up()
             raise MessagingError(self.trouble())
-        status = self._last[SUPERVISOR, Status]
-        shown = [self._last[k, Telemetry].values for k in self._everyone[:-1]]
+        status = self._last[messages.SUPERVISOR, messages.Status]
+        shown = [self._last[k, messages.Telemetry].values for k in self._everyone[:-1]]
         return np.concatenate([*shown, [status.cell, status.entry, status.arrived, *status.causes]])
 
     def _take_sample(
@@ -235,7 +228,7 @@ class SampleExchange:
         self._sampled, membership = self.sample, self.membership
         rests = self._still.sees_rest(np.concatenate([own[(len(own) - 3) // 2 : -3] for own in measured]))
         membership.see(time, self._states, rests=rests)
-        robots = self.missing.keys() - {SUPERVISOR}
+        robots = self.missing.keys() - {messages.SUPERVISOR}
         away = self.missing.keys() - self._unheard
         if self._pacing is None and away and rests and (membership.stopped or not robots):
             self._await(time, measured)
@@ -245,14 +238,14 @@ class SampleExchange:
 
     def _close_line(self, time: float) -> None:
         """Let the drives go on where all robots have begun their cell at the present sample."""
-        efforts = [self._last.get((k, Effort)) for k in self._everyone[:-1]]
+        efforts = [self._last.get((k, messages.Effort)) for k in self._everyone[:-1]]
         begun = all(e and e.number == self.sample and e.state in MOVES for e in efforts)
         if self.membership.stopped and begun and not self.missing:
             self.membership.close_line(time, certified=RETURNS not in self._states.values())
 
     def _effort(self, robot: int, measured: FloatArray) -> FloatArray:
         """Return what the drives of a robot do."""
-        if self.membership.stopped or (known := self._last.get((robot, Effort))) is None:
+        if self.membership.stopped or (known := self._last.get((robot, messages.Effort))) is None:
             return braking_effort(measured[:-3], self.brakes[robot], self._rests.get(robot))
         return np.array(known.efforts)
 
@@ -285,7 +278,7 @@ class SampleExchange:
                 self._expected.setdefault(index, max((late.number, late.time) for late in late_ones))
         reached = self._expected.keys() | ({*asked} - self._ends.present())
         waiting = {
-            (index, Status if index == SUPERVISOR else Telemetry)
+            (index, messages.Status if index == messages.SUPERVISOR else messages.Telemetry)
             for index in (asked if waits_for_all else reached - away)
         }
         deadline = clocks.monotonic() + (TURN if waits_for_all else self._limit())
@@ -306,27 +299,27 @@ class SampleExchange:
 
     def _question(
         self, index: int, time: float, measured: Sequence[FloatArray], *, step: bool
-    ) -> Sample | Tick:
+    ) -> messages.Sample | messages.Tick:
         """Return what a process is asked at an instant."""
         head = self.sample, self._clock(index, time), step, self.membership.stopped
-        if index == SUPERVISOR:
-            return Tick(*head, tuple(self._counts.get(k, 0) for k in self._everyone[:-1]))
-        told, own = self._counts.get(SUPERVISOR), measured[index]
+        if index == messages.SUPERVISOR:
+            return messages.Tick(*head, tuple(self._counts.get(k, 0) for k in self._everyone[:-1]))
+        told, own = self._counts.get(messages.SUPERVISOR), measured[index]
         heard, (placed, moved) = told[index] if told else 0, self._stamps[index].tolist()
         pose, state = tuple(own[-3:].tolist()), tuple(own[:-3].tolist())
-        return Sample(*head, heard, placed, moved, pose, state)
+        return messages.Sample(*head, heard, placed, moved, pose, state)
 
-    def _fits(self, sender: int, message: Effort | Telemetry | Status) -> bool:
+    def _fits(self, sender: int, message: messages.Effort | messages.Telemetry | messages.Status) -> bool:
         """Whether the lists of an answer are as long as they must be, and its state and its cell exist."""
-        if isinstance(message, Status):
+        if isinstance(message, messages.Status):
             robots = len(self._sizes)
             fitting = len(message.team_messages) == robots and len(message.causes) in (0, 1 + robots)
             return fitting and message.cell < self._cells
-        if isinstance(message, Effort):
+        if isinstance(message, messages.Effort):
             size = self._sizes[sender]
             fitting = len(message.efforts) == size and len(message.rest) in (0, size)
         else:
-            before = self._last.get((sender, Telemetry))
+            before = self._last.get((sender, messages.Telemetry))
             fitting = before is None or len(before.values) == len(message.values)
         return fitting and message.state < len(STATES)
 
@@ -346,7 +339,7 @@ class SampleExchange:
 
     def _has_gone(self, index: int) -> bool:
         """Whether a process has ended, or its connection is closed, which a sign of life shows."""
-        return index in self.membership.gone() or not self._ends.send(index, Welcome())
+        return index in self.membership.gone() or not self._ends.send(index, messages.Welcome())
 
     def _lose(self, indices: Any) -> None:
         """Go on without processes; what they have sent to the team need not be waited for."""
@@ -365,36 +358,41 @@ class SampleExchange:
         """
         kind, nothing = type(message), (sender, type(None))
         was_missing, unheard = sender in self.missing, sender in self._unheard
-        if not isinstance(message, Effort | Telemetry | Status) or (was_missing and not (admits or unheard)):
+        if not isinstance(message, messages.Effort | messages.Telemetry | messages.Status) or (
+            was_missing and not (admits or unheard)
+        ):
             return nothing
         if message.number > self.sample or not self._fits(sender, message):
-            self._ends.refusals.add(RefusedError(Reason.VALUE))
+            self._ends.refusals.add(messages.RefusedError(messages.Reason.VALUE))
             return nothing
         asked, time = self._asked[message.number]
-        if isinstance(message, Effort) and not time - self._oldest <= message.stamp <= time + _ROUNDING:
-            self._ends.refusals.add(RefusedError(Reason.STAMP))
+        if (
+            isinstance(message, messages.Effort)
+            and not time - self._oldest <= message.stamp <= time + _ROUNDING
+        ):
+            self._ends.refusals.add(messages.RefusedError(messages.Reason.STAMP))
             return nothing
         expected = self._expected.get(sender, (self.sample, -inf))
         present = (message.number, getattr(message, "time", inf)) >= expected
         age = clocks.monotonic() - asked
-        if isinstance(message, Effort) and self._pacing is not None:
+        if isinstance(message, messages.Effort) and self._pacing is not None:
             self._pacing.note(age)
         if was_missing and not present and not (self._pacing and age <= self._pacing.allowed):
             return nothing
         self._counts[sender] = message.team_messages
-        if not isinstance(message, Status):
+        if not isinstance(message, messages.Status):
             self._states[sender] = message.state
-        knows = message.knows if isinstance(message, Status) else message.state != ASKS
+        knows = message.knows if isinstance(message, messages.Status) else message.state != ASKS
         known = self._last.get((sender, kind))
         if not knows:
             return nothing
         if known is None or message.number >= known.number:
             self._last[sender, kind] = message
-            if kind is not Telemetry:
+            if kind is not messages.Telemetry:
                 self._answered[sender], self._ages[sender] = time, age
-            if isinstance(message, Effort) and message.rest:
+            if isinstance(message, messages.Effort) and message.rest:
                 self._rests[sender] = np.array(message.rest)
-        if was_missing and kind is not Telemetry and (self._pacing is not None or unheard):
+        if was_missing and kind is not messages.Telemetry and (self._pacing is not None or unheard):
             self._unheard.discard(sender)
             self.membership.back(sender)
         return (sender, kind) if present else nothing

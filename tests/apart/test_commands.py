@@ -6,18 +6,8 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
+from coop_drake.apart import team_files
 from coop_drake.apart.messages import SUPERVISOR, WORLD
-from coop_drake.apart.team_files import (
-    KeyPair,
-    dump_address_book,
-    load_address_book,
-    load_keys,
-    load_own_keys,
-    local_book,
-    make_keys,
-    make_team_files,
-    save_keys,
-)
 from coop_drake.cli import app
 from coop_drake.cli.summary import process_lines
 from coop_drake.errors import ScenarioError
@@ -63,11 +53,11 @@ TEAM = (0, 1, SUPERVISOR, WORLD)
 
 
 def test_a_book_comes_back_as_it_was(tmp_path):
-    for keys in ({}, {index: make_keys() for index in TEAM}):
-        book = local_book(2, keys)
+    for keys in ({}, {index: team_files.make_keys() for index in TEAM}):
+        book = team_files.local_book(2, keys)
         path = tmp_path / "addresses.yaml"
-        path.write_text(dump_address_book(book))
-        assert load_address_book(path, 2) == book
+        path.write_text(team_files.dump_address_book(book))
+        assert team_files.load_address_book(path, 2) == book
         assert book.secured == bool(keys)
         assert [book.key_of(index) for index in TEAM] == [
             keys[index].public if keys else None for index in TEAM
@@ -75,7 +65,11 @@ def test_a_book_comes_back_as_it_was(tmp_path):
 
 
 def altered(change):
-    document = parse(dump_address_book(local_book(2, {index: make_keys() for index in TEAM})))
+    document = parse(
+        team_files.dump_address_book(
+            team_files.local_book(2, {index: team_files.make_keys() for index in TEAM})
+        )
+    )
     change(document)
     return write(document)
 
@@ -112,50 +106,52 @@ def test_a_wrong_book_is_refused_with_file_key_and_what_is_allowed(tmp_path, cha
     path = tmp_path / "addresses.yaml"
     path.write_text(altered(change))
     with pytest.raises(ScenarioError) as refused:
-        load_address_book(path, 2)
+        team_files.load_address_book(path, 2)
     assert (refused.value.file, refused.value.key) == (str(path), key)
     assert allowed in refused.value.allowed
 
 
 def test_private_keys_are_for_their_owner_alone_and_never_shown(tmp_path):
-    path, keys = tmp_path / "robot_0.key", make_keys()
-    save_keys(path, keys)
+    path, keys = tmp_path / "robot_0.key", team_files.make_keys()
+    team_files.save_keys(path, keys)
     assert path.stat().st_mode & 0o777 == 0o600
-    assert load_keys(path) == keys
+    assert team_files.load_keys(path) == keys
     assert keys.private not in repr(keys)
     with pytest.raises(FileExistsError):
-        save_keys(path, keys)
+        team_files.save_keys(path, keys)
     path.chmod(0o640)
     with pytest.raises(ScenarioError, match=r"permissions: '640' is not allowed; expected .* chmod 600"):
-        load_keys(path)
+        team_files.load_keys(path)
 
 
 def test_a_file_that_holds_no_pair_of_keys_is_refused_without_showing_it(tmp_path):
-    mixed = KeyPair(make_keys().public, make_keys().private)
-    save_keys(tmp_path / "mixed.key", mixed)
+    mixed = team_files.KeyPair(team_files.make_keys().public, team_files.make_keys().private)
+    team_files.save_keys(tmp_path / "mixed.key", mixed)
     with pytest.raises(ScenarioError, match="secret-key") as refused:
-        load_keys(tmp_path / "mixed.key")
+        team_files.load_keys(tmp_path / "mixed.key")
     assert mixed.private not in str(refused.value)
     (tmp_path / "empty.key").touch(mode=0o600)
     for name in ("empty.key", "none.key"):
         with pytest.raises(ScenarioError, match="the file"):
-            load_keys(tmp_path / name)
+            team_files.load_keys(tmp_path / name)
 
 
 def test_team_files_fit_together_and_each_process_has_its_own_key(tmp_path):
-    book_file, *key_files = make_team_files(tmp_path / "keys", 2, ("192.168.1.10", "192.168.1.11"), 5600)
-    book = load_address_book(book_file, 2)
+    book_file, *key_files = team_files.make_team_files(
+        tmp_path / "keys", 2, ("192.168.1.10", "192.168.1.11"), 5600
+    )
+    book = team_files.load_address_book(book_file, 2)
     assert book.world.address == "tcp://192.168.1.10:5600"
     assert book.supervisor.address == "tcp://192.168.1.11:5601"
     assert [path.name for path in key_files] == ["world.key", "supervisor.key", "robot_0.key", "robot_1.key"]
-    pair = load_own_keys(book, SUPERVISOR, key_files[1])
+    pair = team_files.load_own_keys(book, SUPERVISOR, key_files[1])
     assert pair is not None
     assert pair.public == book.supervisor.key
     with pytest.raises(ScenarioError, match="the key that the address book has for this process"):
-        load_own_keys(book, 0, key_files[1])
+        team_files.load_own_keys(book, 0, key_files[1])
     with pytest.raises(ScenarioError, match=r"--key FILE, as robot_1\.key"):
-        load_own_keys(book, 1, None)
-    assert load_own_keys(local_book(2), 1, None) is None
+        team_files.load_own_keys(book, 1, None)
+    assert team_files.load_own_keys(team_files.local_book(2), 1, None) is None
 
 
 def test_the_command_writes_them_once(tmp_path):

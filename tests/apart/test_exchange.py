@@ -7,20 +7,9 @@ import numpy as np
 import pytest
 
 from coop_drake.answers.budget import Budget
+from coop_drake.apart import messages as msg
 from coop_drake.apart.faults import ChannelFaults, ClockFault, Faults, Gap, load_faults
 from coop_drake.apart.membership import Membership, Processes
-from coop_drake.apart.messages import (
-    SUPERVISOR,
-    WORLD,
-    Effort,
-    Ready,
-    Reason,
-    Refusals,
-    Sample,
-    Status,
-    Telemetry,
-    Welcome,
-)
 from coop_drake.apart.node import FOLLOWS, OUTSIDE, STANDS
 from coop_drake.apart.processes import tolerated_age
 from coop_drake.apart.team_files import local_book
@@ -40,27 +29,27 @@ class Team:
 
     def __init__(self):
         self.questions, self.answers, self.late = [], deque(), False
-        self.refusals, self.sample = Refusals(), 0
+        self.refusals, self.sample = msg.Refusals(), 0
 
     def release(self):
         return {}
 
     def present(self):
-        return {0, SUPERVISOR}
+        return {0, msg.SUPERVISOR}
 
     def send(self, index, question):
-        if isinstance(question, Welcome):
+        if isinstance(question, msg.Welcome):
             return True
-        if isinstance(question, Sample):
+        if isinstance(question, msg.Sample):
             self.questions.append(question)
         now = [] if self.late and index == 0 else self.answers
         number, time = question.number, question.time
-        if index == SUPERVISOR:
-            now.append((index, Status(number, time, True, (0,), 0, 0.0, False, (), 0)))
+        if index == msg.SUPERVISOR:
+            now.append((index, msg.Status(number, time, True, (0,), 0, 0.0, False, (), 0)))
         else:
             if question.step:
-                now.append((0, Effort(number, time, 0, 0, (float(number), 0.0, 0.0), ())))
-            now.append((0, Telemetry(number, time, 0, 0, 0, (time,))))
+                now.append((0, msg.Effort(number, time, 0, 0, (float(number), 0.0, 0.0), ())))
+            now.append((0, msg.Telemetry(number, time, 0, 0, 0, (time,))))
         return True
 
     def receive(self, limit):
@@ -101,7 +90,7 @@ def test_a_robot_that_is_late_for_the_log_between_two_samples_is_not_missing(tea
     assert shown[0] == 0.0
     assert not exchange.missing
     team.late = False
-    team.answers.append((0, Telemetry(1, 0.002, 0, 0, 0, (0.002,))))  # It comes after the next question.
+    team.answers.append((0, msg.Telemetry(1, 0.002, 0, 0, 0, (0.002,))))  # It comes after the next question.
     shown = exchange.look(PERIOD, MEASURED)
     assert shown[0] == PERIOD
     assert exchange.step(PERIOD, MEASURED)[0][0] == 1.0
@@ -128,13 +117,16 @@ def test_drives_take_no_effort_that_rests_on_measurements_of_the_future_or_of_lo
     exchange.look(0.0, MEASURED)
     assert exchange.step(0.0, MEASURED)[0][0] == 0.0
     for stamp in (0.5, -0.1, float("nan")):
-        before = team.refusals.counts[Reason.STAMP]
-        exchange._keep(0, Effort(0, stamp, 0, 0, (9.0, 9.0, 9.0), ()), admits=True)
-        assert team.refusals.counts[Reason.STAMP] == before + 1
+        before = team.refusals.counts[msg.Reason.STAMP]
+        exchange._keep(0, msg.Effort(0, stamp, 0, 0, (9.0, 9.0, 9.0), ()), admits=True)
+        assert team.refusals.counts[msg.Reason.STAMP] == before + 1
     assert exchange.step(PERIOD, MEASURED)[0][0] == 1.0
 
 
-GOOD, STATUS = Effort(0, 0.0, 1, 0, (1.0, 2.0, 3.0), ()), Status(0, 0.0, True, (0,), 0, 0.0, False, (), 0)
+GOOD, STATUS = (
+    msg.Effort(0, 0.0, 1, 0, (1.0, 2.0, 3.0), ()),
+    msg.Status(0, 0.0, True, (0,), 0, 0.0, False, (), 0),
+)
 
 
 @pytest.mark.parametrize(
@@ -144,9 +136,9 @@ GOOD, STATUS = Effort(0, 0.0, 1, 0, (1.0, 2.0, 3.0), ()), Status(0, 0.0, True, (
         (0, msgspec.structs.replace(GOOD, rest=(1e3,) * 40)),
         (0, msgspec.structs.replace(GOOD, number=2**32 - 1)),
         (0, msgspec.structs.replace(GOOD, state=9)),
-        (SUPERVISOR, msgspec.structs.replace(STATUS, team_messages=())),
-        (SUPERVISOR, msgspec.structs.replace(STATUS, causes=(1, 2, 3, 4))),
-        (SUPERVISOR, msgspec.structs.replace(STATUS, cell=3)),
+        (msg.SUPERVISOR, msgspec.structs.replace(STATUS, team_messages=())),
+        (msg.SUPERVISOR, msgspec.structs.replace(STATUS, causes=(1, 2, 3, 4))),
+        (msg.SUPERVISOR, msgspec.structs.replace(STATUS, cell=3)),
     ],
 )
 def test_an_answer_that_is_well_formed_and_does_not_fit_changes_nothing(team, sender, wrong):
@@ -155,7 +147,7 @@ def test_an_answer_that_is_well_formed_and_does_not_fit_changes_nothing(team, se
     assert exchange.step(0.0, MEASURED)[0].tolist() == [0.0, 0.0, 0.0]
     assert exchange.look(0.002, MEASURED)[1:].tolist() == [0.0, 0.0, 0.0]
     assert exchange.facts()["processes"][0]["state"] == "follows the plan"
-    assert team.refusals.counts == {Reason.VALUE: 1}
+    assert team.refusals.counts == {msg.Reason.VALUE: 1}
     assert not exchange.missing
 
 
@@ -211,7 +203,7 @@ def test_a_budget_tolerates_what_its_delay_leaves_beside_that_of_measurements(pl
 
 def test_without_the_supervisor_the_drives_do_not_brake():
     membership = Book().membership
-    membership.lose({SUPERVISOR: 0.3})
+    membership.lose({msg.SUPERVISOR: 0.3})
     membership.see(5.0, {0: FOLLOWS, 1: FOLLOWS}, rests=True)
     assert (membership.stopped, membership.trouble) == (False, "")
 
@@ -255,7 +247,7 @@ def test_a_team_that_rests_outside_its_cell_ends_the_run():
 STEP = 0.01
 
 
-def sending(faults, messages, sender=0, receiver=SUPERVISOR):
+def sending(faults, messages, sender=0, receiver=msg.SUPERVISOR):
     """Numbers of the messages that leave at each sample, one message being sent at each."""
     left, now = [], []
 
@@ -274,7 +266,7 @@ def sending(faults, messages, sender=0, receiver=SUPERVISOR):
 
 
 def reports(count):
-    return [Ready(cell, True) for cell in range(count)]
+    return [msg.Ready(cell, True) for cell in range(count)]
 
 
 def test_every_message_has_its_own_fate_by_the_seed():
@@ -300,15 +292,15 @@ def test_late_messages_leave_after_what_is_sent_then_and_count_where_nothing_has
 
 def test_nothing_passes_a_gap_but_what_the_log_needs():
     gap = Gap(0.02, 0.03, robots=(0,))
-    samples = [Sample(k, k * STEP, True, False, 0, 0.0, 0.0, (), ()) for k in range(8)]
+    samples = [msg.Sample(k, k * STEP, True, False, 0, 0.0, 0.0, (), ()) for k in range(8)]
     faults = Faults(sensors=ChannelFaults(gaps=(gap,)), efforts=ChannelFaults(gaps=(gap,)))
-    assert sending(faults, samples, WORLD, 0)[0] == [(1,), (2,), (), (), (), (6,), (7,), (8,)]
-    assert sending(faults, samples, WORLD, 1)[1] == 8
+    assert sending(faults, samples, msg.WORLD, 0)[0] == [(1,), (2,), (), (), (), (6,), (7,), (8,)]
+    assert sending(faults, samples, msg.WORLD, 1)[1] == 8
     looks = [msgspec.structs.replace(sample, step=False) for sample in samples]
-    assert sending(faults, looks, WORLD, 0)[1] == 8
-    assert sending(faults, [Effort(k, 0.0, 0, 0, (), ()) for k in range(8)], 0, WORLD)[1] == 5
-    assert sending(faults, [Telemetry(k, 0.0, 0, 0, 0, ()) for k in range(8)], 0, WORLD)[1] == 8
-    assert sending(faults, [Welcome()] * 8, WORLD, 0)[0] == [(0,)] * 8
+    assert sending(faults, looks, msg.WORLD, 0)[1] == 8
+    assert sending(faults, [msg.Effort(k, 0.0, 0, 0, (), ()) for k in range(8)], 0, msg.WORLD)[1] == 5
+    assert sending(faults, [msg.Telemetry(k, 0.0, 0, 0, 0, ()) for k in range(8)], 0, msg.WORLD)[1] == 8
+    assert sending(faults, [msg.Welcome()] * 8, msg.WORLD, 0)[0] == [(0,)] * 8
 
 
 def test_a_clock_shows_its_own_time():

@@ -10,27 +10,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from msgspec.inspect import BoolType, FloatType, IntType, Metadata, StrType
 
-from coop_drake.apart.messages import (
-    LONGEST,
-    MOST_ITEMS,
-    PROTOCOL,
-    SUPERVISOR,
-    WORLD,
-    Effort,
-    Hello,
-    Ready,
-    Reason,
-    RefusedError,
-    Sample,
-    Telemetry,
-    decode,
-    decoder_of,
-    encode,
-    kinds_of,
-    protocol_of,
-)
+from coop_drake.apart import messages as msg
 
-PAIRS = [(a, b) for a, b in product((0, SUPERVISOR, WORLD), repeat=2) if a != b]
+PAIRS = [(a, b) for a, b in product((0, msg.SUPERVISOR, msg.WORLD), repeat=2) if a != b]
 raw = msgspec.msgpack.encode
 
 SAMPLE = {
@@ -54,7 +36,7 @@ def values(kind):
 
 
 def messages(sender, receiver):
-    return st.sampled_from(kinds_of(sender, receiver)).flatmap(
+    return st.sampled_from(msg.kinds_of(sender, receiver)).flatmap(
         lambda cls: st.builds(cls, *(values(field.type) for field in msgspec.inspect.type_info(cls).fields))
     )
 
@@ -62,36 +44,36 @@ def messages(sender, receiver):
 sent_between = st.sampled_from(PAIRS).flatmap(lambda pair: st.tuples(st.just(pair), messages(*pair)))
 
 
-def refused(data, sender=WORLD, receiver=0):
-    with pytest.raises(RefusedError) as caught:
-        decode(data, decoder_of(sender, receiver))
-    assert caught.value.reason is Reason.MALFORMED
+def refused(data, sender=msg.WORLD, receiver=0):
+    with pytest.raises(msg.RefusedError) as caught:
+        msg.decode(data, msg.decoder_of(sender, receiver))
+    assert caught.value.reason is msg.Reason.MALFORMED
     return caught.value.detail
 
 
 @given(sent_between, st.integers(0, 2**32 - 1), st.integers(0, 2**32 - 1))
 def test_every_message_comes_back_as_it_was_and_every_real_number_bit_for_bit(sent, session, number):
     pair, message = sent
-    data = encode(session, number, message)
-    assert len(data) <= LONGEST
-    *head, back = decode(data, decoder_of(*pair))
+    data = msg.encode(session, number, message)
+    assert len(data) <= msg.LONGEST
+    *head, back = msg.decode(data, msg.decoder_of(*pair))
     assert (head, type(back)) == ([session, number], type(message))
-    assert encode(session, number, back) == data  # So that a nan comes back as the same nan, too.
+    assert msg.encode(session, number, back) == data  # So that a nan comes back as the same nan, too.
 
 
 @given(sent_between, st.data())
 def test_bytes_that_are_cut_changed_or_random_raise_nothing_but_a_refusal(sent, data):
     pair, message = sent
-    whole = bytearray(encode(1, 1, message))
+    whole = bytearray(msg.encode(1, 1, message))
     cut = bytes(whole[: data.draw(st.integers(0, len(whole) - 1))])
     refused(cut, *pair)
     whole[data.draw(st.integers(0, len(whole) - 1))] ^= data.draw(st.integers(1, 255))
     for other in (bytes(whole), data.draw(st.binary(max_size=80))):
         try:
-            _, _, read = decode(other, decoder_of(*pair))
-        except RefusedError:
+            _, _, read = msg.decode(other, msg.decoder_of(*pair))
+        except msg.RefusedError:
             continue
-        assert isinstance(read, kinds_of(*pair))
+        assert isinstance(read, msg.kinds_of(*pair))
 
 
 @pytest.mark.parametrize(
@@ -101,13 +83,13 @@ def test_bytes_that_are_cut_changed_or_random_raise_nothing_but_a_refusal(sent, 
         ({"robot_state": [1.0, math.inf]}, r"at `$[2].robot_state[1]`"),
         ({"time": True}, "Expected `float`, got `bool`"),
         ({"number": 2**32}, "Expected `int` <= 4294967295"),
-        ({"robot_state": [0.0] * (MOST_ITEMS + 1)}, "length <= 4096"),
+        ({"robot_state": [0.0] * (msg.MOST_ITEMS + 1)}, "length <= 4096"),
         ({"more": 1}, "unknown field `more`"),
         ({"type": "Tick"}, "Invalid value 'Tick'"),  # That of a supervisor.
     ],
 )
 def test_a_field_of_another_type_or_beyond_its_limits_is_refused_and_named(change, words):
-    assert decode(raw([1, 1, SAMPLE]), decoder_of(WORLD, 0))[2].object_pose == (1.0, 2.0, 0.5)
+    assert msg.decode(raw([1, 1, SAMPLE]), msg.decoder_of(msg.WORLD, 0))[2].object_pose == (1.0, 2.0, 0.5)
     assert words in refused(raw([1, 1, SAMPLE | change]))
 
 
@@ -135,28 +117,32 @@ def test_another_form_a_bomb_or_a_length_that_is_not_there_is_refused(data):
 
 def test_whole_numbers_count_as_real_ones_and_short_reals_are_read():
     whole = SAMPLE | {"time": 3, "object_pose": [1, 2, 2**64 - 1]}
-    assert decode(raw([1, 1, whole]), decoder_of(WORLD, 0))[2].object_pose == (1.0, 2.0, float(2**64 - 1))
+    assert msg.decode(raw([1, 1, whole]), msg.decoder_of(msg.WORLD, 0))[2].object_pose == (
+        1.0,
+        2.0,
+        float(2**64 - 1),
+    )
     short = raw([1, 1, SAMPLE]).replace(b"\xcb" + struct.pack(">d", 2.0), b"\xca" + struct.pack(">f", 2.0))
-    assert decode(short, decoder_of(WORLD, 0))[2].object_pose == (1.0, 2.0, 0.5)
+    assert msg.decode(short, msg.decoder_of(msg.WORLD, 0))[2].object_pose == (1.0, 2.0, 0.5)
 
 
 def test_what_only_the_log_shows_may_be_no_number_and_an_effort_may_not():
-    shown = Telemetry(1, 0.0, 0, 0, 0, (math.nan, math.inf))
-    assert math.isnan(decode(encode(1, 1, shown), decoder_of(0, WORLD))[2].values[0])
-    refused(encode(1, 1, Effort(1, 0.0, 0, 0, (math.nan,), ())), 0, WORLD)
+    shown = msg.Telemetry(1, 0.0, 0, 0, 0, (math.nan, math.inf))
+    assert math.isnan(msg.decode(msg.encode(1, 1, shown), msg.decoder_of(0, msg.WORLD))[2].values[0])
+    refused(msg.encode(1, 1, msg.Effort(1, 0.0, 0, 0, (math.nan,), ())), 0, msg.WORLD)
 
 
 def test_who_may_send_what():
-    ready = encode(1, 1, Ready(1, True))
-    assert decode(ready, decoder_of(0, SUPERVISOR))[2] == Ready(1, True)
+    ready = msg.encode(1, 1, msg.Ready(1, True))
+    assert msg.decode(ready, msg.decoder_of(0, msg.SUPERVISOR))[2] == msg.Ready(1, True)
     for pair in PAIRS:
-        if pair != (0, SUPERVISOR):
+        if pair != (0, msg.SUPERVISOR):
             refused(ready, *pair)
 
 
 def test_a_hello_says_its_protocol_in_all_versions():
-    assert protocol_of(encode(7, 0, Hello(PROTOCOL, 0, "", ""))) == (7, PROTOCOL)
-    assert protocol_of(raw([7, 0, {"type": "Hello", "protocol": 9, "name": "left arm"}])) == (7, 9)
-    sample = Sample(1, 0.0, True, False, 0, 0.0, 0.0, (), ())
-    for other in (encode(7, 1, sample), b"\1\x0d\xcd\4\0", NESTED, raw([7, 0, {"type": "Hello"}])):
-        assert protocol_of(other) is None
+    assert msg.protocol_of(msg.encode(7, 0, msg.Hello(msg.PROTOCOL, 0, "", ""))) == (7, msg.PROTOCOL)
+    assert msg.protocol_of(raw([7, 0, {"type": "Hello", "protocol": 9, "name": "left arm"}])) == (7, 9)
+    sample = msg.Sample(1, 0.0, True, False, 0, 0.0, 0.0, (), ())
+    for other in (msg.encode(7, 1, sample), b"\1\x0d\xcd\4\0", NESTED, raw([7, 0, {"type": "Hello"}])):
+        assert msg.protocol_of(other) is None

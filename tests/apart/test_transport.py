@@ -13,26 +13,8 @@ import msgspec
 import pytest
 import zmq
 
+from coop_drake.apart import messages as msg
 from coop_drake.apart.faults import ChannelFaults, Faults
-from coop_drake.apart.messages import (
-    LONGEST,
-    MOST_ITEMS,
-    PROTOCOL,
-    SUPERVISOR,
-    WORLD,
-    Effort,
-    Goodbye,
-    Hello,
-    Ready,
-    Reason,
-    Sample,
-    Status,
-    Switch,
-    Telemetry,
-    Tick,
-    Welcome,
-    encode,
-)
 from coop_drake.apart.team_files import local_book, make_keys
 from coop_drake.apart.transport import Ends, Network
 from coop_drake.errors import MessagingError
@@ -40,7 +22,7 @@ from coop_drake.errors import MessagingError
 LIMIT = 10.0
 """Longest time that a test waits for what must come [s]."""
 
-EFFORT = Effort(1, 0.0, 0, 0, (1.0, 2.0, 3.0), ())
+EFFORT = msg.Effort(1, 0.0, 0, 0, (1.0, 2.0, 3.0), ())
 
 
 class Team:
@@ -49,7 +31,7 @@ class Team:
     def __init__(self, keys=None):
         self.keys, self.opened = keys or {}, []
         self.book = local_book(2, self.keys)
-        self.world = self.join(WORLD)
+        self.world = self.join(msg.WORLD)
 
     def join(self, index, *, keys=None, **changes):
         """The ends of a process, which have not asked for sessions yet."""
@@ -62,17 +44,17 @@ class Team:
         """Poll all until something holds; return what the world heard meanwhile, without sessions."""
         heard, end = [], monotonic() + LIMIT
         while not done():
-            assert monotonic() < end, [other.clients[WORLD].trouble for other in others]
+            assert monotonic() < end, [other.clients[msg.WORLD].trouble for other in others]
             for other in others:
                 other.receive()
-            if (taken := self.world.receive(0.002)) and not isinstance(taken[1], Hello):
+            if (taken := self.world.receive(0.002)) and not isinstance(taken[1], msg.Hello):
                 heard.append(taken)
         return heard
 
     def connect(self, index, **changes):
         """The ends of a process that has a session with the world."""
         ends = self.join(index, **changes)
-        self.settle(lambda: ends.sessions[WORLD].open and index in self.world.present(), ends)
+        self.settle(lambda: ends.sessions[msg.WORLD].open and index in self.world.present(), ends)
         return ends
 
     def stranger(self):
@@ -91,10 +73,10 @@ class Team:
 
     def works_for(self, robot):
         """An effort and a measurement cross, whatever else has been sent."""
-        assert robot.send(WORLD, EFFORT)
+        assert robot.send(msg.WORLD, EFFORT)
         assert news(self.world) == (0, EFFORT)
         number = self.world.sent(0)
-        assert self.world.send(0, Sample(number, 0.0, True, False, 0, 0.0, 0.0, (), ()))
+        assert self.world.send(0, msg.Sample(number, 0.0, True, False, 0, 0.0, 0.0, (), ()))
         assert news(robot)[1].number == number
 
     def close(self):
@@ -111,7 +93,7 @@ def team():
 
 @pytest.fixture(scope="module")
 def team_keys():
-    return {index: make_keys() for index in (0, 1, SUPERVISOR, WORLD)}
+    return {index: make_keys() for index in (0, 1, msg.SUPERVISOR, msg.WORLD)}
 
 
 @pytest.fixture
@@ -123,13 +105,13 @@ def secured(team_keys):
 
 def news(ends):
     """The next message that is not about sessions, with its sender."""
-    while isinstance((taken := ends.receive(LIMIT))[1], Hello | Welcome):
+    while isinstance((taken := ends.receive(LIMIT))[1], msg.Hello | msg.Welcome):
         pass
     return taken
 
 
 def session_of(ends):
-    return ends.sessions[WORLD].number
+    return ends.sessions[msg.WORLD].number
 
 
 @pytest.mark.parametrize("with_keys", [False, True])
@@ -138,36 +120,40 @@ def test_everything_crosses_and_comes_in_its_order(with_keys, team_keys):
     try:
         with pytest.raises(MessagingError, match=r"came from robot 0, robot 1, the supervisor \(waited"):
             team.world.open(0.05)
-        supervisor, *robots = ends = [team.join(index) for index in (SUPERVISOR, 0, 1)]
+        supervisor, *robots = ends = [team.join(index) for index in (msg.SUPERVISOR, 0, 1)]
         deadline = monotonic() + LIMIT
-        while team.world.present() != {0, 1, SUPERVISOR} or supervisor.present() != {0, 1, WORLD}:
+        while team.world.present() != {0, 1, msg.SUPERVISOR} or supervisor.present() != {0, 1, msg.WORLD}:
             assert monotonic() < deadline
             for each in (team.world, *ends):
                 if (taken := each.receive(0.001)) is not None:
-                    assert isinstance(taken[1], Hello | Welcome)
+                    assert isinstance(taken[1], msg.Hello | msg.Welcome)
         for number in range(1, 4):
             for k, robot in enumerate(robots):
-                sample = Sample(number, 0.1 + number, True, False, 0, 0.0, 0.0, (1.0, 2.0, 0.5), (0.1 * k,))
+                sample = msg.Sample(
+                    number, 0.1 + number, True, False, 0, 0.0, 0.0, (1.0, 2.0, 0.5), (0.1 * k,)
+                )
                 assert team.world.send(k, sample)
-                assert news(robot) == (WORLD, sample)
-                assert robot.send(SUPERVISOR, Ready(number, ready=True))
-                assert news(supervisor) == (k, Ready(number, ready=True))
-                assert supervisor.send(k, Switch(number + 1, 17))
-                assert news(robot) == (SUPERVISOR, Switch(number + 1, 17))
-                assert robot.send(WORLD, EFFORT)
+                assert news(robot) == (msg.WORLD, sample)
+                assert robot.send(msg.SUPERVISOR, msg.Ready(number, ready=True))
+                assert news(supervisor) == (k, msg.Ready(number, ready=True))
+                assert supervisor.send(k, msg.Switch(number + 1, 17))
+                assert news(robot) == (msg.SUPERVISOR, msg.Switch(number + 1, 17))
+                assert robot.send(msg.WORLD, EFFORT)
                 assert news(team.world) == (k, EFFORT)
         tick, status = (
-            Tick(7, 0.035, True, False, (1, 1)),
-            Status(7, 0.035, True, (0, 0), 2, 0.0, False, (), 4),
+            msg.Tick(7, 0.035, True, False, (1, 1)),
+            msg.Status(7, 0.035, True, (0, 0), 2, 0.0, False, (), 4),
         )
-        assert team.world.send(SUPERVISOR, tick)
-        assert news(supervisor) == (WORLD, tick)
-        assert supervisor.send(WORLD, status)
-        assert news(team.world) == (SUPERVISOR, status)
-        assert team.world.send(0, Goodbye(0))
-        assert news(robots[0]) == (WORLD, Goodbye(0))
+        assert team.world.send(msg.SUPERVISOR, tick)
+        assert news(supervisor) == (msg.WORLD, tick)
+        assert supervisor.send(msg.WORLD, status)
+        assert news(team.world) == (msg.SUPERVISOR, status)
+        assert team.world.send(0, msg.Goodbye(0))
+        assert news(robots[0]) == (msg.WORLD, msg.Goodbye(0))
         assert (
-            [robot.sent(SUPERVISOR) for robot in robots] == [supervisor.sent(k) for k in range(2)] == [3, 3]
+            [robot.sent(msg.SUPERVISOR) for robot in robots]
+            == [supervisor.sent(k) for k in range(2)]
+            == [3, 3]
         )
         assert not any(each.refusals.total for each in (team.world, *ends))
     finally:
@@ -179,21 +165,21 @@ def test_who_does_not_answer_is_named_with_its_address_and_nothing_is_sent_to_it
     address = team.book.supervisor.address
     with pytest.raises(MessagingError, match=f"the supervisor at {address}: nothing answers there"):
         robot.open(0.05)
-    assert not robot.send(SUPERVISOR, Ready(1, ready=True))
-    assert not team.world.send(1, Goodbye(0))
-    assert (robot.sent(SUPERVISOR), team.world.sent(1)) == (0, 0)
+    assert not robot.send(msg.SUPERVISOR, msg.Ready(1, ready=True))
+    assert not team.world.send(1, msg.Goodbye(0))
+    assert (robot.sent(msg.SUPERVISOR), team.world.sent(1)) == (0, 0)
 
 
 def test_an_address_that_is_taken_is_named(team):
     with pytest.raises(
         MessagingError, match=f"{team.book.world.address}: cannot listen there: address already"
     ):
-        team.join(WORLD)
+        team.join(msg.WORLD)
 
 
 def test_a_name_belongs_to_one_connection_until_that_is_gone(team):
     first, second = team.connect(0), team.join(0)
-    client = second.clients[WORLD]
+    client = second.clients[msg.WORLD]
     team.settle(lambda: client.trouble == "another process of this name is connected", first, second)
     team.works_for(first)
     assert team.world.sent(0) == 1
@@ -218,10 +204,10 @@ def test_a_process_that_is_stopped_loses_its_name_after_two_seconds(team):
         team.settle(lambda: 0 in team.world.present())
         os.kill(process.pid, signal.SIGSTOP)
         begin, second = monotonic(), team.join(0)
-        team.settle(lambda: second.sessions[WORLD].open, second)
+        team.settle(lambda: second.sessions[msg.WORLD].open, second)
         assert 1.0 < monotonic() - begin < 6.0
         os.kill(process.pid, signal.SIGCONT)
-        team.settle(lambda: team.world.refusals.counts[Reason.SESSION] > 2, second)
+        team.settle(lambda: team.world.refusals.counts[msg.Reason.SESSION] > 2, second)
         team.works_for(second)
     finally:
         process.kill()
@@ -232,22 +218,26 @@ def test_the_first_messages_are_those_of_the_session_which_begins_once(team):
     robot = team.join(0)
     while (taken := team.world.receive(0.01)) is None:
         robot.receive()
-    assert taken == (0, Hello(PROTOCOL, 0, "scenario", "plan"))
-    assert robot.receive(LIMIT) == (WORLD, Welcome())
+    assert taken == (0, msg.Hello(msg.PROTOCOL, 0, "scenario", "plan"))
+    assert robot.receive(LIMIT) == (msg.WORLD, msg.Welcome())
     for _ in range(3):  # As where the answer takes long.
-        robot.sessions[WORLD].tell(taken[1])
+        robot.sessions[msg.WORLD].tell(taken[1])
     team.works_for(robot)
-    assert (robot.sessions[WORLD].count, team.world.refusals.total, robot.refusals.total) == (1, 0, 0)
+    assert (robot.sessions[msg.WORLD].count, team.world.refusals.total, robot.refusals.total) == (1, 0, 0)
 
 
 @pytest.mark.parametrize(
     ("hello", "words", "reason"),
     [
-        (Hello(PROTOCOL, 0, "another", "plan"), "it has another scenario", "SESSION"),
-        (Hello(PROTOCOL, 0, "scenario", "another"), "it has another plan", "SESSION"),
-        (Hello(PROTOCOL, 7, "scenario", "plan"), "it knows no process of this name", "SENDER"),
-        ({"type": "Hello", "protocol": 6, "name": "arm"}, f"it speaks protocol {PROTOCOL}, not 6", "VERSION"),
-        (Hello(4, 0, "scenario", "plan"), f"it speaks protocol {PROTOCOL}, not 4", "VERSION"),
+        (msg.Hello(msg.PROTOCOL, 0, "another", "plan"), "it has another scenario", "SESSION"),
+        (msg.Hello(msg.PROTOCOL, 0, "scenario", "another"), "it has another plan", "SESSION"),
+        (msg.Hello(msg.PROTOCOL, 7, "scenario", "plan"), "it knows no process of this name", "SENDER"),
+        (
+            {"type": "Hello", "protocol": 6, "name": "arm"},
+            f"it speaks protocol {msg.PROTOCOL}, not 6",
+            "VERSION",
+        ),
+        (msg.Hello(4, 0, "scenario", "plan"), f"it speaks protocol {msg.PROTOCOL}, not 4", "VERSION"),
     ],
 )
 def test_who_gets_no_session_is_told_why(team, hello, words, reason):
@@ -270,39 +260,39 @@ def test_a_client_finds_a_server_that_starts_again_and_counts_anew(team):
     team.works_for(robot)
     before = session_of(robot)
     team.world.close()
-    team.world = team.join(WORLD)
-    team.settle(lambda: robot.sessions[WORLD].count == 2 and 0 in team.world.present(), robot)
+    team.world = team.join(msg.WORLD)
+    team.settle(lambda: robot.sessions[msg.WORLD].count == 2 and 0 in team.world.present(), robot)
     assert session_of(robot) != before
-    assert robot.sent(WORLD) == 0
+    assert robot.sent(msg.WORLD) == 0
     team.works_for(robot)
 
 
 def test_messages_of_another_session_or_with_a_passed_number_are_refused(team):
     robot, stranger, other = team.connect(0), team.stranger(), team.connect(1)
     team.works_for(robot)
-    session, data = session_of(robot), encode(session_of(robot), 1, EFFORT)
+    session, data = session_of(robot), msg.encode(session_of(robot), 1, EFFORT)
     stranger.send(data)  # As it was heard on another connection.
-    other.sessions[WORLD]._put(encode(session, 1, EFFORT))
-    robot.sessions[WORLD]._put(encode(session ^ 1, 2, EFFORT))
+    other.sessions[msg.WORLD]._put(msg.encode(session, 1, EFFORT))
+    robot.sessions[msg.WORLD]._put(msg.encode(session ^ 1, 2, EFFORT))
     assert team.refused(3) == {"SESSION": 3}
-    robot.sessions[WORLD]._put(data)
+    robot.sessions[msg.WORLD]._put(data)
     assert team.refused(4) == {"SESSION": 3, "SEQUENCE": 1}
     team.works_for(robot)
-    sample = Sample(9, 0.0, True, False, 0, 0.0, 0.0, (), ())
+    sample = msg.Sample(9, 0.0, True, False, 0, 0.0, 0.0, (), ())
     for number, own in ((1, session), (5, session ^ 1)):
-        team.world.sessions[0]._put(encode(own, number, sample))
+        team.world.sessions[0]._put(msg.encode(own, number, sample))
     team.settle(lambda: robot.refusals.total == 2, robot)
-    assert robot.refusals.counts == {Reason.SEQUENCE: 1, Reason.SESSION: 1}
+    assert robot.refusals.counts == {msg.Reason.SEQUENCE: 1, msg.Reason.SESSION: 1}
 
 
 def test_malformed_messages_are_refused_counted_and_said_once_and_all_go_on(team, capfd):
     robot, stranger, dice = team.connect(0), team.stranger(), random.Random(1)
-    good = encode(session_of(robot), 1, EFFORT)
+    good = msg.encode(session_of(robot), 1, EFFORT)
     bad = [dice.randbytes(dice.randrange(60)) for _ in range(40)] + [good[:k] for k in range(len(good))]
-    bad += [encode(session_of(robot), 1, Ready(1, ready=True)), b"\x91" * 60_000]
+    bad += [msg.encode(session_of(robot), 1, msg.Ready(1, ready=True)), b"\x91" * 60_000]
     for data in bad:
         stranger.send(data)
-        robot.sessions[WORLD]._put(data)
+        robot.sessions[msg.WORLD]._put(data)
     stranger.send_multipart([good, good, good])
     assert team.refused(2 * len(bad) + 1) == {"SESSION": len(bad), "MALFORMED": len(bad) + 1}
     assert capfd.readouterr().err.count("the world refused a message, and goes on: ") == 1
@@ -319,12 +309,12 @@ def test_connections_that_do_not_speak_zeromq_do_no_harm(team):
                 connection.sendall(b"GET / HTTP/1.1\r\n\r\n" + dice.randbytes(200))
         team.works_for(robot)
     team.works_for(robot)
-    assert robot.sessions[WORLD].count == 1
+    assert robot.sessions[msg.WORLD].count == 1
 
 
 def test_a_message_that_is_too_long_closes_its_connection(team):
     robot, stranger = team.connect(0), team.stranger()
-    stranger.send(bytes(LONGEST + 1))
+    stranger.send(bytes(msg.LONGEST + 1))
 
     def heard_again():  # What is sent before the connection is open again goes with the one that was closed.
         stranger.send(b"\4")
@@ -337,12 +327,12 @@ def test_a_message_that_is_too_long_closes_its_connection(team):
 
 def test_a_peer_that_floods_takes_turns_with_the_others_and_is_not_kept_for_ever(team):
     robot, flooder = team.connect(0), team.connect(1)
-    shown = Telemetry(1, 0.0, 0, 0, 0, (0.0,) * MOST_ITEMS)
+    shown = msg.Telemetry(1, 0.0, 0, 0, 0, (0.0,) * msg.MOST_ITEMS)
     sent = 0
-    while flooder.send(WORLD, shown):
+    while flooder.send(msg.WORLD, shown):
         sent += 1
     assert sent < 4000  # Two queues of a thousand, and what the system keeps for a connection.
-    assert robot.send(WORLD, EFFORT)
+    assert robot.send(msg.WORLD, EFFORT)
     before = 0
     while team.world.receive(LIMIT) != (0, EFFORT):
         before += 1
@@ -356,14 +346,14 @@ def test_both_ends_count_what_is_lost_repeated_and_late(team):
     robot = team.connect(0, faults=faults, period=0.01)
     for sample in range(60):
         robot.sample = sample
-        robot.send(WORLD, Effort(sample, 0.0, 0, 0, (), ()))
+        robot.send(msg.WORLD, msg.Effort(sample, 0.0, 0, 0, (), ()))
         robot.release()
-    count = robot.sent(WORLD)
+    count = robot.sent(msg.WORLD)
     heard = [team.world.receive(LIMIT)[1].number for _ in range(count)]
     assert 20 < count < 50
     assert heard == sorted(set(heard))
     assert team.world.receive(0.05) is None
-    assert set(team.world.refusals.counts) == {Reason.SEQUENCE}
+    assert set(team.world.refusals.counts) == {msg.Reason.SEQUENCE}
 
 
 @pytest.mark.parametrize(
@@ -378,10 +368,10 @@ def test_both_ends_count_what_is_lost_repeated_and_late(team):
 def test_a_key_speaks_for_its_own_process_alone_to_its_own_world(secured, team_keys, keys, words, reason):
     robot = secured.connect(0)
     if keys == "none":
-        secured.stranger().send(encode(5, 0, Hello(PROTOCOL, 1, "scenario", "plan")))
+        secured.stranger().send(msg.encode(5, 0, msg.Hello(msg.PROTOCOL, 1, "scenario", "plan")))
         secured.settle(lambda: secured.world.refusals.total > 0)
     else:
-        book = local_book(2, team_keys | {WORLD: make_keys()})
+        book = local_book(2, team_keys | {msg.WORLD: make_keys()})
         other = replace(book, world=replace(book.world, address=secured.book.world.address))
         changes = {
             "unknown": {"keys": make_keys()},
@@ -389,7 +379,7 @@ def test_a_key_speaks_for_its_own_process_alone_to_its_own_world(secured, team_k
             "for another world": {"book": other},
         }
         thief = secured.join(0 if keys == "of robot 1" else 1, **changes[keys])
-        client = thief.clients[WORLD]
+        client = thief.clients[msg.WORLD]
         secured.settle(lambda: secured.world.refusals.total > 0 and words in client.trouble, thief)
         assert not client.session.open
     assert {why.name for why in secured.world.refusals.counts} == {reason}

@@ -4,19 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from coop_drake.laws.robot_dynamics import (
-    COLUMNS,
-    COM_X,
-    COM_Y,
-    INERTIA,
-    MASS,
-    PARENT,
-    POSITION,
-    RATE,
-    TURN,
-    X,
-    Y,
-)
+from coop_drake.laws import robot_dynamics
 
 
 def perpendicular(vector):
@@ -82,15 +70,25 @@ class PlanarArm:
     def chain(self):
         """Return the arm as the table that ``coop_drake.laws.robot_dynamics`` reads."""
         n = len(self.lengths)
-        chain = np.zeros((n + 2, COLUMNS))
-        chain[0, [RATE, MASS, INERTIA]] = 3 + n, self.base_mass, self.base_inertia
+        chain = np.zeros((n + 2, robot_dynamics.COLUMNS))
+        chain[0, [robot_dynamics.RATE, robot_dynamics.MASS, robot_dynamics.INERTIA]] = (
+            3 + n,
+            self.base_mass,
+            self.base_inertia,
+        )
         joints = self.shoulder[0] + np.concatenate([[0.0], np.cumsum(self.lengths)])
-        chain[1:, PARENT] = np.arange(n + 1)
-        chain[1:, X], chain[1:, Y] = joints, self.shoulder[1]
-        chain[1:-1, TURN], chain[1:-1, MASS] = 1.0, self.masses
-        chain[1:-1, POSITION], chain[1:-1, RATE] = 3 + np.arange(n), 6 + n + np.arange(n)
-        chain[1:-1, COM_X], chain[1:-1, COM_Y] = joints[:-1] + 0.5 * self.lengths, self.shoulder[1]
-        chain[1:-1, INERTIA] = self.masses * self.lengths**2 / 12.0
+        chain[1:, robot_dynamics.PARENT] = np.arange(n + 1)
+        chain[1:, robot_dynamics.X], chain[1:, robot_dynamics.Y] = joints, self.shoulder[1]
+        chain[1:-1, robot_dynamics.TURN], chain[1:-1, robot_dynamics.MASS] = 1.0, self.masses
+        chain[1:-1, robot_dynamics.POSITION], chain[1:-1, robot_dynamics.RATE] = (
+            3 + np.arange(n),
+            6 + n + np.arange(n),
+        )
+        chain[1:-1, robot_dynamics.COM_X], chain[1:-1, robot_dynamics.COM_Y] = (
+            joints[:-1] + 0.5 * self.lengths,
+            self.shoulder[1],
+        )
+        chain[1:-1, robot_dynamics.INERTIA] = self.masses * self.lengths**2 / 12.0
         return chain
 
     def dynamics(self, z, z_dot):

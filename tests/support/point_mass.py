@@ -8,16 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from shapely import Point
 
+from coop_drake import laws
 from coop_drake.geometry import BoundaryDistance
 from coop_drake.harmonic_maps import HarmonicMap, VelocityField
-from coop_drake.laws import (
-    energy_margin,
-    funnel_acceleration,
-    governed_acceleration,
-    governor_velocity,
-    slowdown_radius,
-    tracking_energy,
-)
 from coop_drake.laws.axis_table import axis_table, first_jumps
 from coop_drake.laws.ppc import fading, governed_gains
 from coop_drake.systems.kernels import ready_conditions
@@ -49,7 +42,7 @@ def build_fields(plan, *, tolerance=1e-4):
     return [
         VelocityField(
             HarmonicMap(cell.tidied, Point(transition.target), tolerance=tolerance),
-            slowdown_radius=slowdown_radius(1.0, transition.gains.governor_gain),
+            slowdown_radius=laws.slowdown_radius(1.0, transition.gains.governor_gain),
         )
         for cell, transition in zip(plan.cells, plan.transitions, strict=True)
     ]
@@ -129,14 +122,14 @@ def _play(plan, index, state, jumps, field, distances, conditions, seen, limits)
 
     def margin_of(z, t):
         stiffness = governed_gains(row, t)[0]
-        energy = tracking_energy(*(z[:2] - z[4:6]), *z[2:4], stiffness)
-        return energy_margin(energy, distance(z[4:6]), stiffness)
+        energy = laws.tracking_energy(*(z[:2] - z[4:6]), *z[2:4], stiffness)
+        return laws.energy_margin(energy, distance(z[4:6]), stiffness)
 
     def rates(z, t):
         stiffness, damping, gain = governed_gains(row, t)
-        force = governed_acceleration(z[:2], z[2:4], z[4:6], stiffness, damping)
-        governor = governor_velocity(*field(z[4:6]), margin_of(z, t), stiffness, gain, gains.smoothing)
-        axes = funnel_acceleration(z[6 : 6 + n], z[6 + n :], funnel, t, gains)
+        force = laws.governed_acceleration(z[:2], z[2:4], z[4:6], stiffness, damping)
+        governor = laws.governor_velocity(*field(z[4:6]), margin_of(z, t), stiffness, gain, gains.smoothing)
+        axes = laws.funnel_acceleration(z[6 : 6 + n], z[6 + n :], funnel, t, gains)
         axes += fading(t, gains.hand_over_time) * jumps
         return np.concatenate([z[2:4], force, governor, z[6 + n :], axes])
 
@@ -149,8 +142,8 @@ def _play(plan, index, state, jumps, field, distances, conditions, seen, limits)
             if index + 1 < len(plan.cells):
                 own, following = funnel, plan.funnel(index + 1)
                 axes = state[6 : 6 + n], state[6 + n :]
-                jumps[:] = funnel_acceleration(*axes, own, t, gains)
-                jumps -= funnel_acceleration(*axes, following, 0.0, plan.transitions[index + 1].gains)
+                jumps[:] = laws.funnel_acceleration(*axes, own, t, gains)
+                jumps -= laws.funnel_acceleration(*axes, following, 0.0, plan.transitions[index + 1].gains)
             return state, t, True
         k1 = rates(state, t)
         seen["energy"] = min(seen["energy"], margin_of(state, t))

@@ -13,19 +13,7 @@ from pydrake.systems.framework import BasicVector, Context, DiagramBuilder, Disc
 from pydrake.systems.primitives import Demultiplexer
 
 from coop_drake.answers.log import SimulationLog
-from coop_drake.compiled_loop import CompiledTransport
-from coop_drake.compiled_loop.arrays import (
-    ACCELERATION,
-    COMMAND,
-    ENERGY,
-    LoopCells,
-    LoopDepartures,
-    LoopMemory,
-    LoopNominal,
-    LoopTeam,
-    RobotRoom,
-    robot_room,
-)
+from coop_drake.compiled_loop import CompiledTransport, arrays
 from coop_drake.compiled_loop.loop import update
 from coop_drake.compiled_loop.robots import compute, heard_cell, read_own
 from coop_drake.compiled_loop.running import believed, departures_of, memory_of, nominal_of
@@ -62,9 +50,9 @@ POSE, GOVERNOR, MARGIN, READY, ALARM, WANTED = 0, 3, 5, 6, 8, 11
 
 @compiled
 def tell(
-    cells: LoopCells, team: LoopTeam, nominal: LoopNominal, departures: LoopDepartures, room: RobotRoom,
-    memory: LoopMemory, sample: int, number: int, now: float, instant: FloatArray, shown: FloatArray,
-    bounds: FloatArray,
+    cells: arrays.LoopCells, team: arrays.LoopTeam, nominal: arrays.LoopNominal,
+    departures: arrays.LoopDepartures, room: arrays.RobotRoom, memory: arrays.LoopMemory, sample: int,
+    number: int, now: float, instant: FloatArray, shown: FloatArray, bounds: FloatArray,
 ) -> None:  # fmt: skip
     """Write what the blocks of all robots and the cell planner would show now, before a sample's updates.
 
@@ -87,13 +75,13 @@ def tell(
         read_own(k, team.places, team.first, team.base_chains, team.yaws[k], room.motion, memory.state, robot)
         row[POSE : POSE + 3] = robot[:3]
         row[GOVERNOR : GOVERNOR + 2] = led[4:6] if nominal.flow.size else governors[k]
-        row[MARGIN] = room.told[k, ENERGY]
+        row[MARGIN] = room.told[k, arrays.ENERGY]
         if nominal.flow.size:
             edges = cells.governed[cells.first[0, heard] : cells.first[0, heard + 1]]
             row[MARGIN] = nominal_margin(edges, cells.numbers[heard, 1], led)
         row[READY : READY + 2] = memory.reports[0, k]
         row[ALARM : ALARM + 3] = memory.alarms[k, :3]
-        row[WANTED:] = room.told[k, ACCELERATION : COMMAND + 6]
+        row[WANTED:] = room.told[k, arrays.ACCELERATION : arrays.COMMAND + 6]
         own = np.empty(2 * (end - begin))
         write_bounds(cells.tables[heard, begin:end], time, own)
         bounds[0, begin:end], bounds[1, begin:end] = own[: end - begin], own[end - begin :]
@@ -119,8 +107,8 @@ class SampledTeam(Block):
     """
 
     def __init__(
-        self, cells: LoopCells, team: LoopTeam, nominal: LoopNominal, departures: LoopDepartures,
-        memory: LoopMemory,
+        self, cells: arrays.LoopCells, team: arrays.LoopTeam, nominal: arrays.LoopNominal,
+        departures: arrays.LoopDepartures, memory: arrays.LoopMemory,
     ) -> None:  # fmt: skip
         super().__init__()
         known, self._robots, self._axes = (
@@ -138,8 +126,8 @@ class SampledTeam(Block):
         }
         self._efforts = self._parts["efforts"][0]
         shown, bounds = np.empty((self._robots, SHOWN)), np.empty((2, self._axes))
-        self._tell = partial(tell, *known, robot_room(team, memory))
-        self._update = partial(update, *known, robot_room(team, memory))
+        self._tell = partial(tell, *known, arrays.robot_room(team, memory))
+        self._update = partial(update, *known, arrays.robot_room(team, memory))
         self._follow = partial(lag_behind, lag)
         self._state = self.DeclareVectorInputPort("team_state", memory.state.size)
         start = np.concatenate([[0.0, 0.0], *(part.ravel() for part in kept.values())])
@@ -150,10 +138,10 @@ class SampledTeam(Block):
         self.DeclareVectorOutputPort("telemetry", size, self._write_telemetry)
         self.declare_update(self._step, self._period)
 
-    def _remembered(self, flat: FloatArray, team_state: FloatArray) -> LoopMemory:
+    def _remembered(self, flat: FloatArray, team_state: FloatArray) -> arrays.LoopMemory:
         """Return the fields of ``LoopMemory`` as views of the state."""
         views = {name: flat[part].reshape(shape) for name, (part, shape) in self._parts.items()}
-        return LoopMemory(state=team_state, **views)
+        return arrays.LoopMemory(state=team_state, **views)
 
     def _write_efforts(self, context: Context, output: BasicVector) -> None:
         flat = context.get_discrete_state_vector().value()

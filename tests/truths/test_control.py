@@ -8,17 +8,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
-from coop_drake.laws import (
-    Funnel,
-    ScheduledGains,
-    acceleration_at,
-    energy_margin,
-    funnel_bounds,
-    object_twist,
-    total_wrench,
-    tracking_energy,
-    wrench_share,
-)
+from coop_drake import laws
 from coop_drake.laws.gains import schedule_of, scheduled_governor
 from coop_drake.laws.ppc import ramped_gain
 from coop_drake.laws.readiness import clearance_margin
@@ -44,14 +34,14 @@ def funnels(draw):
     goal_lower = lower + start * (1.0 - part) * width
     goal_upper = min(goal_lower + part * width, lower + width)
     arrays = [np.array([value]) for value in (lower, lower + width, goal_lower, goal_upper, draw(rates))]
-    return Funnel(*arrays, shape=draw(shapes))
+    return laws.Funnel(*arrays, shape=draw(shapes))
 
 
 @law
 @given(funnels(), times, times)
 def test_a_funnel_contains_its_goal_and_lies_in_its_slice(funnel, one, other):
     rounding = 1e-12
-    early, late = funnel_bounds(funnel, min(one, other)), funnel_bounds(funnel, max(one, other))
+    early, late = laws.funnel_bounds(funnel, min(one, other)), laws.funnel_bounds(funnel, max(one, other))
     chain = [funnel.slice_lower, early.lower, late.lower, funnel.goal_lower]
     assert all(below <= above + rounding for below, above in pairwise(chain))
     chain = [funnel.goal_upper, late.upper, early.upper, funnel.slice_upper]
@@ -64,8 +54,8 @@ def test_a_funnel_contains_its_goal_and_lies_in_its_slice(funnel, one, other):
 def test_rates_and_accelerations_of_the_walls_are_their_derivatives(funnel, time):
     h = 1e-5 / funnel.decay_rate[0]
     time = time + h
-    bounds = funnel_bounds(funnel, time)
-    ahead, behind = funnel_bounds(funnel, time + h), funnel_bounds(funnel, time - h)
+    bounds = laws.funnel_bounds(funnel, time)
+    ahead, behind = laws.funnel_bounds(funnel, time + h), laws.funnel_bounds(funnel, time - h)
     scale = 1.0 + abs(funnel.slice_lower[0]) + abs(funnel.slice_upper[0])
     for value, derivative in (
         ("lower", "lower_rate"),
@@ -101,7 +91,7 @@ def test_the_energy_decays_as_predicted(funnel, time, fraction, v, kappa, gain, 
     """V' along the flow, by central differences of V, is -kappa k1 s^2 - k2 (x' - v)^2, also in a ramp."""
     time = time + 1e-3
     k1, k1_rate = ramped_gain(time, gain, mu)
-    bounds = funnel_bounds(funnel, time)
+    bounds = laws.funnel_bounds(funnel, time)
     x = (1.0 - fraction) * bounds.lower + fraction * bounds.upper
     width = (bounds.upper - bounds.lower)[0]
     v *= width
@@ -120,7 +110,7 @@ def test_the_energy_decays_as_predicted(funnel, time, fraction, v, kappa, gain, 
         return energy_and_terms(
             moved,
             v + acceleration * step,
-            funnel_bounds(funnel, time + step),
+            laws.funnel_bounds(funnel, time + step),
             kappa,
             ramped_gain(time + step, gain, mu)[0],
         )[0]
@@ -151,7 +141,7 @@ def test_an_axis_stays_in_its_funnel_and_ends_in_the_middle_of_its_goal(
 ):
     """Simulated with an adaptive integrator over a funnel that closes to a part of its slice."""
     goal_lower = place * (1.0 - part)
-    funnel = Funnel(
+    funnel = laws.Funnel(
         np.zeros(1),
         np.ones(1),
         np.array([goal_lower]),
@@ -166,7 +156,7 @@ def test_an_axis_stays_in_its_funnel_and_ends_in_the_middle_of_its_goal(
 
     def flow(t, state):
         rates = {"rate_gain": k2, "position_gain_rate": ramped_gain(t, gain, mu)[1]}
-        bounds = funnel_bounds(funnel, t)
+        bounds = laws.funnel_bounds(funnel, t)
         return np.array(
             [state[1], prescribed_acceleration(state[:1], state[1:], bounds, **law(t), **rates)[0]]
         )
@@ -175,7 +165,7 @@ def test_an_axis_stays_in_its_funnel_and_ends_in_the_middle_of_its_goal(
     assert run.success
     energies = []
     for t, x, v in zip(run.t, *run.y, strict=True):
-        bounds = funnel_bounds(funnel, t)
+        bounds = laws.funnel_bounds(funnel, t)
         assert bounds.lower[0] < x < bounds.upper[0]
         energies.append(prescribed_energy(np.array([x]), np.array([v]), bounds, **law(t))[0])
     assert np.all(np.diff(energies) <= 1e-7 * (1.0 + energies[0]))
@@ -206,11 +196,13 @@ def test_the_margin_never_becomes_negative(gains, smoothing, start, target, head
     governor, target = LOWER + start * (UPPER - LOWER), LOWER + target * (UPPER - LOWER)
     clearance = box_clearance(LOWER, UPPER)
     stiffness = gains[0]
-    energy = filled * energy_margin(0.0, clearance(governor), stiffness)
+    energy = filled * laws.energy_margin(0.0, clearance(governor), stiffness)
     direction = np.array([np.cos(heading), np.sin(heading)])
     velocity = np.sqrt(2.0 * split * energy) * direction
     position = governor + np.sqrt(2.0 * (1.0 - split) * energy / stiffness) * direction
-    assume(tracking_energy(*(position - governor), *velocity, stiffness) <= energy * (1.0 + 1e-9) + 1e-12)
+    assume(
+        laws.tracking_energy(*(position - governor), *velocity, stiffness) <= energy * (1.0 + 1e-9) + 1e-12
+    )
     run = run_governor(
         clearance,
         straight_field(target),
@@ -236,7 +228,7 @@ def test_every_hand_over_is_reached_and_leaves_margin(half_height, half_overlap,
     height = np.array([0.0, half_height])
     following = box_clearance(np.array([3.0 - half_overlap, 0.0]) - height, np.array([5.0, 0.0]) + height)
     target, inradius = np.array([3.0, 0.0]), min(half_height, half_overlap)
-    stiffness = scheduled_governor(schedule_of(ScheduledGains()), half_height)[0]
+    stiffness = scheduled_governor(schedule_of(laws.ScheduledGains()), half_height)[0]
     start = np.array([0.3, 1.8 * heading - 0.9])
     run = run_governor(
         here,
@@ -248,7 +240,7 @@ def test_every_hand_over_is_reached_and_leaves_margin(half_height, half_overlap,
         seconds=15.0,
     )
     margins = [
-        energy_margin(tracking_energy(*(p - g), *v, stiffness), following(g), stiffness)
+        laws.energy_margin(laws.tracking_energy(*(p - g), *v, stiffness), following(g), stiffness)
         for p, v, g in zip(run.position, run.velocity, run.governor, strict=True)
     ]
     ready = [clearance_margin(m, stiffness, inradius) >= 0.0 for m in margins]
@@ -280,17 +272,17 @@ def test_shares_sum_to_the_command(offsets, com_offset, acceleration, rate, mass
         data.draw(st.lists(st.floats(0.01, 1.0), min_size=len(offsets), max_size=len(offsets)))
     )
     weights /= weights.sum()
-    of_com = acceleration_at(*com_offset, *acceleration, rate)
+    of_com = laws.acceleration_at(*com_offset, *acceleration, rate)
     shares = np.array(
         [
-            wrench_share(*(com_offset - offset), *of_com, acceleration[2], mass, inertia, weight)
+            laws.wrench_share(*(com_offset - offset), *of_com, acceleration[2], mass, inertia, weight)
             for offset, weight in zip(offsets, weights, strict=True)
         ]
     )
     commanded = np.array([mass * of_com[0], mass * of_com[1], inertia * acceleration[2]])
     # Every robot carries its part of the force.
     assert shares[:, :2] == pytest.approx(weights[:, None] * commanded[:2], rel=1e-12, abs=1e-12)
-    total = total_wrench(shares, np.array(offsets), com_offset, 0.0)
+    total = laws.total_wrench(shares, np.array(offsets), com_offset, 0.0)
     assert total == pytest.approx(commanded, rel=1e-12, abs=1e-10)
 
 
@@ -299,7 +291,7 @@ def test_shares_sum_to_the_command(offsets, com_offset, acceleration, rate, mass
 def test_every_robot_knows_the_same_object_twist(offset_L, twist, theta):
     offset = turned(theta, offset_L)
     at_grasp = np.array([twist[0] - twist[2] * offset[1], twist[1] + twist[2] * offset[0], twist[2]])
-    assert object_twist(*offset, *at_grasp) == pytest.approx(twist, rel=1e-12, abs=1e-12)
+    assert laws.object_twist(*offset, *at_grasp) == pytest.approx(twist, rel=1e-12, abs=1e-12)
 
 
 @pytest.mark.slow
