@@ -11,7 +11,7 @@ from coop_drake.answers.problem import PlanningProblem
 from coop_drake.diagnosis.diagnosing import changes, shrunk_bodies, widened_joints
 from coop_drake.diagnosis.variants import WidenedFloor, is_free
 from coop_drake.tree.component_tree import Body, Component, ComponentTree
-from tests.planning.test_continuous_joints import turret
+from tests.planning.test_search import turret
 from tests.support.cases import disc, rectangle, team_tree
 from tests.support.trees import placed_shape
 

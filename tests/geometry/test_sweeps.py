@@ -1,19 +1,80 @@
+"""Convex polygons and their sweeps, eq. (6); how far a team reaches."""
+
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
-from shapely import LineString, MultiPoint, Point, Polygon
+from shapely import LineString, MultiPoint, Point, Polygon, box
 from shapely.affinity import rotate
 
+from coop_drake.geometry.distances import separated
 from coop_drake.geometry.sweeps import (
+    circumscribed,
+    closed_directions,
     common_disc,
+    edge_directions,
     grown,
+    half_planes_polygon,
+    normals,
     over_prismatic,
     over_revolute,
+    support,
     under_prismatic,
     under_revolute,
 )
 from coop_drake.geometry.swept_tree import inscribed
+from coop_drake.tree.team_arrays import place
+from tests.support.trees import trees
+
+SQUARE = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
+
+
+def test_supports_at_the_edges_rebuild_the_polygon() -> None:
+    directions = closed_directions(edge_directions(SQUARE), 0.75 * np.pi)
+    rebuilt = Polygon(circumscribed(directions, support(SQUARE, directions)))
+    assert rebuilt.symmetric_difference(Polygon(SQUARE)).area == pytest.approx(0.0, abs=1e-7)
+
+
+def test_directions_are_closed_and_distinct() -> None:
+    directions = closed_directions(np.array([0.0, 0.0, 1e-9, 6.2]), 0.5)
+    gaps = np.diff(np.append(directions, directions[0] + 2 * np.pi))
+    assert gaps.min() > 0.0
+    assert gaps.max() <= 0.5 + 1e-12
+
+
+def test_half_planes_of_a_polygon_rebuild_it_from_inside() -> None:
+    angles = edge_directions(SQUARE)
+    offsets = (normals(angles) * SQUARE).sum(axis=1)
+    rebuilt = half_planes_polygon(angles, offsets)
+    assert Polygon(SQUARE).contains(Polygon(rebuilt))
+    assert Polygon(rebuilt).area == pytest.approx(1.0, abs=1e-7)
+
+
+def test_redundant_and_repeated_half_planes_change_nothing() -> None:
+    angles = np.concatenate((edge_directions(SQUARE), edge_directions(SQUARE), [0.3]))
+    offsets = np.concatenate(((normals(edge_directions(SQUARE)) * SQUARE).sum(axis=1), [5.0] * 5))
+    rebuilt = half_planes_polygon(angles, offsets)
+    assert Polygon(rebuilt).area == pytest.approx(1.0, abs=1e-7)
+
+
+def test_half_planes_that_exclude_each_other_leave_nothing() -> None:
+    angles = np.array([0.0, np.pi, 0.5 * np.pi, -0.5 * np.pi])
+    assert len(half_planes_polygon(angles, np.array([1.0, -2.0, 1.0, 1.0]))) == 0
+
+
+@pytest.mark.parametrize(("shift", "apart"), [(1.1, True), (0.9, False), (-1.1, True), (0.0, False)])
+def test_squares_are_told_apart(shift: float, apart: bool) -> None:
+    other = SQUARE + np.array([shift, 0.2])
+    assert separated(SQUARE, other) is apart
+    assert separated(SQUARE, other) is box(0, 0, 1, 1).disjoint(Polygon(other))
+
+
+def test_gap_shifts_the_verdict() -> None:
+    other = SQUARE + np.array([1.05, 0.0])
+    assert separated(SQUARE, other, 0.04)
+    assert not separated(SQUARE, other, 0.06)
+    assert separated(SQUARE, SQUARE + np.array([0.99, 0.0]), -0.02)
+
 
 RECTANGLE = np.array([[0.1, -0.1], [0.6, -0.1], [0.6, 0.1], [0.1, 0.1]])
 ROUND_PIVOT = np.array([[-0.3, -0.2], [0.6, -0.2], [0.5, 0.3], [-0.2, 0.25]])
@@ -128,3 +189,28 @@ def test_common_disc_lies_in_the_disc_about_every_centre(points: list[tuple[floa
     if len(common):
         for x, y in points:
             assert np.hypot(common[:, 0] - x, common[:, 1] - y).max() <= 0.25
+
+
+@settings(max_examples=40)
+@given(st.data())
+def test_no_point_of_the_team_is_beyond_its_reach(data: st.DataObject) -> None:
+    tree = data.draw(trees())
+    random = np.random.default_rng(data.draw(st.integers(0, 1000)))
+    for share in random.integers(0, 2, (20, len(tree.joints))):
+        joints = tree.range_lower + share * (tree.range_upper - tree.range_lower)
+        poses = tree.poses((0.0, 0.0, 0.7, *joints))
+        for X_WC, component in zip(poses, tree.components, strict=True):
+            for shape in (shape for body in component.bodies for shape in body.shapes):
+                assert np.hypot(*X_WC.apply(shape.vertices).T).max() + shape.radius <= tree.reach + 1e-12
+
+
+@settings(max_examples=40)
+@given(st.data())
+def test_compiled_poses_are_the_same_numbers(data: st.DataObject) -> None:
+    tree = data.draw(trees())
+    random = np.random.default_rng(data.draw(st.integers(0, 1000)))
+    z = random.normal(size=3 + len(tree.joints))
+    rows = place(tree.arrays, z)
+    assert [(pose.x, pose.y, pose.angle) for pose in tree.poses(z)] == [
+        tuple(row) for row in rows[:, [0, 1, 4]].tolist()
+    ]

@@ -76,15 +76,6 @@ def test_map_agrees_with_an_independent_solver(domain):
     assert np.hypot(*(T - oracle(points)).T).max() <= bound
 
 
-def test_square_keeps_its_symmetry():
-    harmonic_map = HarmonicMap(box(-1, -1, 1, 1), Point(0, 0))
-    points = domains.inside(box(-1, -1, 1, 1), 100)
-    T, _ = harmonic_map(points)
-    quarter = np.array([[0.0, -1.0], [1.0, 0.0]])
-    np.testing.assert_allclose(harmonic_map(points @ quarter.T)[0], T @ quarter.T, atol=1e-9)
-    np.testing.assert_allclose(harmonic_map.goal_image, 0.0, atol=1e-9)
-
-
 def test_outer_ring_goes_to_the_circle_linearly_in_arc_length(mapped):
     points, expected = boundary_samples(mapped.region)
     T, J = mapped(points)
@@ -92,17 +83,6 @@ def test_outer_ring_goes_to_the_circle_linearly_in_arc_length(mapped):
     turn = np.array([[np.cos(offset), -np.sin(offset)], [np.sin(offset), np.cos(offset)]])
     np.testing.assert_allclose(T, expected @ turn.T, atol=1e-6)
     assert np.isfinite(J).all()
-
-
-def test_holes_collapse_to_interior_points():
-    domain, goal = NAMED["warehouse"]
-    harmonic_map = HarmonicMap(domain, goal)
-    for hole in domain.interiors:
-        T, _ = harmonic_map(
-            np.array([hole.interpolate(s).coords[0] for s in np.linspace(0, hole.length, 40)])
-        )
-        assert np.ptp(T, axis=0).max() < 1e-7
-        assert np.hypot(*T[0]) < 1.0
 
 
 def test_jacobian_is_the_derivative(mapped):
@@ -216,14 +196,6 @@ def test_coordinates_far_from_the_origin_do_no_harm():
     np.testing.assert_allclose(
         far(points + np.array([1e4, -2e4]))[0], HarmonicMap(domain, goal)(points)[0], atol=1e-7
     )
-
-
-def test_same_question_same_answer():
-    domain, goal = NAMED["warehouse"]
-    points = domains.inside(domain, 50)
-    first, second = HarmonicMap(domain, goal), HarmonicMap(domain, goal)
-    assert first(points)[0].tobytes() == second(points)[0].tobytes()
-    assert first(points)[1].tobytes() == second(points)[1].tobytes()
 
 
 ELL = Polygon([(0, 0), (2, 0), (2, 1), (1, 1), (1, 2), (0, 2)])

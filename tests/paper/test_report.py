@@ -1,4 +1,4 @@
-"""The report on the paper's example: verdicts follow the runs, and the page stands alone."""
+"""The report on the paper's example, the figure of slices, and the picture of errata."""
 
 from __future__ import annotations
 
@@ -10,18 +10,22 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from coop_drake.drawing.colours import INK
+from coop_drake.drawing.colours import BLUE, INK, VERMILLION
 from coop_drake.laws import FixedGains
 from coop_drake.plant.team import ObjectInertia
 from coop_drake.viz import path_figure
-from paper import Agreement, GainFigures, Material, exhibits, pages, write_report
+from paper import Agreement, GainFigures, Material, exhibits, pages, slice_figure, write_report
 from paper.approximation import approximations, two_components
 from paper.background import ASSUMPTIONS, ERRATA
+from paper.errata_figure import errata_figure, write_errata_figure
 from paper.runs import GAIN_SETS, Run
 from paper.stated import FIGURE_3_SLICES
 from tests.support.cases import case
 from tests.support.figure_names import OF_EVERY_RUN, OF_TWO_ROBOTS
+from tests.support.sliding import with_sliding_joint
 from tests.support.synthetic_log import synthetic_log, synthetic_plan
+
+# The report on the paper's example: verdicts follow the runs, and the page stands alone.
 
 DOCS = Path(__file__).parents[2] / "docs"
 
@@ -167,3 +171,86 @@ def test_errata_are_those_of_the_documents_and_every_assumption_is_used(material
     used = {key for exhibit in exhibits(material) for key in exhibit.because}
     assert used <= set(ERRATA) | set(ASSUMPTIONS)
     assert set(ASSUMPTIONS) <= used
+
+
+# The figure of slices: a narrow slice proves more of the floor free, and leaves less undecided.
+
+
+@pytest.fixture(scope="module")
+def figure():
+    wide, narrow = (((1.57 - h, 1.57 + h), (-h, h), (-h, h)) for h in (0.4, 0.1))
+    return slice_figure(case("base"), [wide, narrow])
+
+
+def areas(axes):
+    texts = [text.get_text() for text in axes.get_legend().get_texts()[:2]]
+    return [float(re.search(r": ([\d.]+) m²", text)[1]) for text in texts]
+
+
+def test_every_slice_has_its_footprints_and_its_cells(figure):
+    assert len(figure.axes) == 4
+    assert figure.axes[0].get_title(loc="left").startswith("θ 67° to 113°,  robot_0 joint_1 -23° to 23°")
+
+
+def test_what_is_proved_free_and_what_may_be_free_come_closer_in_a_narrow_slice(figure):
+    (free, maybe), (free_in_narrow, maybe_in_narrow) = (areas(figure.axes[row]) for row in (1, 3))
+    assert free < free_in_narrow < maybe_in_narrow < maybe
+
+
+def test_a_sliding_joint_is_labelled_in_metres():
+    problem = case("base")
+    problem = replace(problem, tree=with_sliding_joint(problem.tree))
+    left = slice_figure(problem, [((1.5, 1.6), (-0.1, 0.1), (-0.05, 0.05))]).axes[0]
+    assert left.get_title(loc="left").endswith(",  robot_1 joint_1 -0.05 m to 0.05 m")
+
+
+# The picture of errata: every panel shows the printed formula fail where the corrected one holds.
+
+
+@pytest.fixture(scope="module")
+def errata_picture():
+    return errata_figure()
+
+
+@pytest.fixture(scope="module")
+def panels(errata_picture):
+    return {ax.get_title().split(":")[0]: ax for ax in errata_picture.axes}
+
+
+def curves(ax, colour):
+    return [
+        np.asarray(line.get_ydata(), dtype=float)
+        for line in ax.get_lines()
+        if line.get_color() == colour and len(line.get_ydata()) > 1
+    ]
+
+
+@pytest.mark.parametrize(
+    ("panel", "fails"),
+    [
+        ("E15a", lambda y: y.min() < -2.0),
+        ("E15b", lambda y: y.min() > 0.29),
+        ("E10", lambda y: y.min() < 2.0),
+        ("E21", lambda y: np.abs(y).max() > 1.0),
+        ("E17b", lambda y: y.max() > 1e6),
+        ("E18", lambda y: y.max() > 1e4),
+        ("E20", lambda y: y[-1] > y[0]),
+    ],
+)
+def test_red_fails_and_blue_does_not(panels, panel, fails):
+    (red,), (blue,) = curves(panels[panel], VERMILLION), curves(panels[panel], BLUE)
+    assert fails(red)
+    assert not fails(blue)
+
+
+def test_the_funnel_has_room_in_blue_only(panels):
+    red, blue = curves(panels["E17a"], VERMILLION), curves(panels["E17a"], BLUE)
+    assert red[1][0] - red[0][0] == pytest.approx(0.0, abs=1e-12)
+    assert blue[1][0] - blue[0][0] > 0.1
+
+
+def test_the_picture_is_written_where_it_is_said_to_be(errata_picture, tmp_path, monkeypatch):
+    monkeypatch.setattr("paper.errata_figure.errata_figure", lambda: errata_picture)
+    path = write_errata_figure(tmp_path / "new")
+    assert path.parent == tmp_path / "new"
+    assert path.stat().st_size > 10_000

@@ -62,15 +62,6 @@ def ask(problem):
     return planner.plan(problem, ScheduledGains(), gain_set_name="scheduled")
 
 
-def test_a_channel_becomes_a_plan(asked):
-    problem, channel = bent_channel(cells=3)
-    asked(channel)
-    result = ask(problem)
-    assert isinstance(result, Found)
-    assert result.plan.gain_set == "scheduled"
-    assert result.report == REPORT
-
-
 def test_a_question_that_is_changed_afterwards_is_another_question(asked):
     problem, _ = bent_channel(cells=3)
     questions = asked(NoChannel(True, "separated"), NoChannel(True, "separated"))
@@ -244,17 +235,9 @@ def base():
     return problem, result.plan
 
 
-def test_the_plan_is_executable_and_tidy(base):
-    _, made = base
-    check_plan(made, "base")
-    assert len(made.cells) >= 15
-    for cell in made.cells:
-        assert not cell.tidied.interiors
-    assert np.mean([len(cell.tidied.exterior.coords) for cell in made.cells]) < 25
-
-
 def test_the_transport_arrives_in_time_and_stays_in_its_cells(base):
     problem, made = base
+    check_plan(made, "base")
     transport = carry_out(made, build_fields(made))
     assert transport.stuck is None
     assert float(np.sum(transport.durations)) <= 60.0

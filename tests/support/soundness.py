@@ -8,11 +8,28 @@ from shapely import Point, maximum_inscribed_circle
 
 from coop_drake.answers.problem import PlanningProblem
 from coop_drake.planning.cells.cells import FreeBox
-from coop_drake.planning.channel import Channel
+from coop_drake.planning.channel import Channel, NoChannel
+from coop_drake.planning.search import find_channel
 from coop_drake.planning.transitions import goal_values
 from tests.support.free_positions import FreePositions
 
 _POSITIONS = 200
+
+
+def sound_channel(problem: PlanningProblem) -> Channel:
+    """The channel that is found, after its exact checks."""
+    channel, _ = find_channel(problem)
+    assert isinstance(channel, Channel)
+    assert_channel_is_sound(problem, channel)
+    return channel
+
+
+def no_channel(problem: PlanningProblem, *, proved: bool = True) -> NoChannel:
+    """Why no channel is found: it is proved that there is none, or nothing is."""
+    answer, _ = find_channel(problem)
+    assert isinstance(answer, NoChannel)
+    assert answer.proved is proved
+    return answer
 
 
 def assert_channel_is_sound(problem: PlanningProblem, channel: Channel, samples: int = 6) -> None:

@@ -24,8 +24,7 @@ from coop_drake.errors import PlanError, RefusalError
 from coop_drake.tree.component_tree import ComponentTree
 from coop_drake.verification import verify_file
 from coop_drake.verification.question import question_of
-from tests.planning.test_degenerate_input import CLOSED_FLOORS, OPEN_FLOORS, question
-from tests.planning.test_questions import reaching
+from tests.planning.test_search import CLOSED_FLOORS, OPEN_FLOORS, question, reaching
 from tests.support.cases import case
 from tests.support.certificates import GAINS, bent_corridor, changed, room_with_pillar, write
 from tests.support.moved import Similarity
