@@ -22,9 +22,8 @@ from coop_drake.scenario.deployment import ActuatorLimits, Deafness
 from coop_drake.simulation import build_maps, simulate
 from tests.support.cli import invoke
 from tests.support.same_runs import differences
-from tests.support.sampled_team import sampled
 from tests.support.scenarios import write_scenario
-from tests.support.small_loop import small_maps, small_problem
+from tests.support.small_loop import sampled, small_maps, small_problem
 
 PERIOD = 0.01
 

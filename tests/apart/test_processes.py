@@ -23,8 +23,7 @@ from coop_drake.scenario import Control, Hold, Measurements, Messages
 from coop_drake.simulation import communication, run_loop, simulate
 from coop_drake.verification.runs import verify_log
 from tests.support.same_runs import differences
-from tests.support.sampled_team import sampled
-from tests.support.small_loop import small_maps
+from tests.support.small_loop import sampled, small_maps
 
 pytestmark = pytest.mark.no_cover
 

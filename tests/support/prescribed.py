@@ -9,26 +9,17 @@ from coop_drake.tree.pose import FloatArray
 
 
 def prescribed_acceleration(
-    position: FloatArray,
-    rate: FloatArray,
-    bounds: FunnelBounds,
-    *,
-    log_gain: FloatArray,
-    position_gain: float,
-    rate_gain: float,
-    position_gain_rate: float = 0.0,
-    saturation: float = SATURATION,
-) -> FloatArray:
-    """Return the acceleration of ``track_axis`` for every axis, shape (m,).
+    position: FloatArray, rate: FloatArray, bounds: FunnelBounds, *, log_gain: FloatArray,
+    position_gain: float, rate_gain: float, position_gain_rate: float = 0.0, saturation: float = SATURATION,
+) -> FloatArray:  # fmt: skip
+    """The acceleration of ``track_axis`` for every axis, shape (m,).
 
     Args:
-        position: x of every axis, shape (m,) [rad or m].
-        rate: x' of every axis, shape (m,).
+        position, rate: x and x' of every axis, shape (m,) [rad or m, per s].
         bounds: Funnel bounds now.
         log_gain: kappa of every axis, shape (m,) [rad^2/s^2 or m^2/s^2].
-        position_gain: k1 now [1/s].
+        position_gain, position_gain_rate: k1 [1/s] and k1' [1/s^2] now.
         rate_gain: k2 [1/s].
-        position_gain_rate: k1' now [1/s^2].
         saturation: Smallest distance to a bound, over the width [-].
     """
     gains = position_gain, position_gain_rate, rate_gain, saturation
@@ -43,22 +34,12 @@ def prescribed_energy(
     log_gain: FloatArray,
     position_gain: float,
 ) -> FloatArray:
-    """Return the energy V of ``track_axis`` for every axis, shape (m,); arguments as above."""
+    """The energy V of ``track_axis`` for every axis, shape (m,); arguments as above."""
     return tracked(position, rate, bounds, log_gain, (position_gain, 0.0, 0.0, SATURATION))[:, 1]
 
 
-def tracked(
-    position: FloatArray,
-    rate: FloatArray,
-    bounds: FunnelBounds,
-    log_gain: FloatArray,
-    gains: tuple[float, float, float, float],
-) -> FloatArray:
-    """Return acceleration and energy of every axis, shape (m, 2)."""
-    others = tuple(float(gain) for gain in gains)
-    return np.array(
-        [
-            track_axis(x, v, axis, (kappa, *others))
-            for x, v, axis, kappa in zip(position, rate, zip(*bounds, strict=True), log_gain, strict=True)
-        ]
-    )
+def tracked(position, rate, bounds, log_gain, gains) -> FloatArray:
+    """Acceleration and energy of every axis, shape (m, 2)."""
+    others, axes = tuple(map(float, gains)), zip(*bounds, strict=True)
+    rows = zip(position, rate, axes, log_gain, strict=True)
+    return np.array([track_axis(x, v, axis, (kappa, *others)) for x, v, axis, kappa in rows])

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
+from typing import Any
 
 from pydrake.systems.framework import DiagramBuilder
 
@@ -12,7 +14,7 @@ from coop_drake.geometry.polygons import BoundaryDistance
 from coop_drake.harmonic_maps import HarmonicMap, VelocityField
 from coop_drake.laws import GainSet
 from coop_drake.plant import build_team_plant
-from coop_drake.scenario import Scenario
+from coop_drake.scenario import Control, Deployment, Scenario
 from coop_drake.simulation import build_maps
 from coop_drake.systems import GovernedCell
 from tests.support.small_plan import small_plan
@@ -31,6 +33,13 @@ def small_problem(team: str = "base", gain_set: GainSet | None = None) -> tuple[
     """Scenario and hand-written plan of a team."""
     scenario = small_scenario(team)
     return scenario, small_plan(joint_names(scenario), gain_set)
+
+
+def sampled(team: str, control: Control | None = None, **departures: Any) -> tuple[Scenario, Plan]:
+    """Scenario at 100 Hz and hand-written plan of a team, with departures from the ideal one."""
+    scenario, plan = small_problem(team)
+    deployment = Deployment(control_rate=100.0, **departures)
+    return replace(scenario, deployment=deployment, control=control or Control()), plan
 
 
 def joint_names(scenario: Scenario) -> tuple[str, ...]:

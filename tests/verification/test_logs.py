@@ -11,6 +11,7 @@ from coop_drake.scenario import ActuatorLimits, Deployment, Measurements, Messag
 from coop_drake.simulation import build_maps, simulate
 from coop_drake.verification.runs import Rows, verify_log
 from coop_drake.verification.runs.budget import check_nominal_reports
+from coop_drake.verification.runs.laws import check_handovers
 from tests.support.small_loop import small_maps, small_problem
 from tests.support.tubes import WITH_AXES, tubed_problem
 
@@ -169,6 +170,18 @@ def test_a_log_with_too_few_rows_is_refused_as_too_sparse(case):
     kept = np.unique(np.concatenate([np.arange(0, len(log.times), 8), *entries(log), [len(log.times) - 1]]))
     thinned = replace(log, **{name: getattr(log, name)[kept] for name in arrays(log)})
     assert "the log is too sparse" in refused(thinned, against).finding
+
+
+def test_a_cell_that_is_kept_although_all_robots_are_ready_is_refused(case):
+    log, (plan, *_) = case
+    row, names = int(entries(log)[0][0]), ("cell_index", "transition_start", "ready_margins")
+    cells, starts, ready = (getattr(log, name).copy() for name in names)
+    starts[cells == cells[row] + 1] = log.times[row + 1]
+    cells[row + 1], starts[row + 1], ready[row + 1] = cells[row], starts[row], 1.0
+    later = replace(log, **dict(zip(names, (cells, starts, ready), strict=True)))
+    assert len(check_handovers(Rows(log, plan), exact=True)) == 2
+    with pytest.raises(RefusalError, match="is kept although all robots are ready"):
+        check_handovers(Rows(later, plan), exact=True)
 
 
 def test_distances_between_rows_are_bounded_closely(case):
