@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import re
 import socket
-from collections.abc import Iterator
+from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field
 from ipaddress import IPv4Address
@@ -135,13 +135,13 @@ class AddressBook:
     def __post_init__(self) -> None:
         if not 1 <= len(self.robots) <= MOST_ROBOTS:
             raise DataError("robots", len(self.robots), f"a list of 1 to {MOST_ROBOTS}")
-        seen: set[str] = set()
-        outside = [name for name, address in self._addresses() if not _host(name, address).is_loopback]
-        for name, address in self._addresses():
-            if address in seen:
-                raise DataError(name, address, "an address of its own")
-            seen.add(address)
-        keys = dict(self._keys())
+        listeners = {"world": self.world, "supervisor": self.supervisor}
+        addresses = {f"{name}.address": one.address for name, one in listeners.items()}
+        outside = [name for name, address in addresses.items() if not _host(name, address).is_loopback]
+        if self.world.address == self.supervisor.address:
+            raise DataError("supervisor.address", self.supervisor.address, "an address of its own")
+        robots = {f"robots[{k}]": robot for k, robot in enumerate(self.robots)}
+        keys = {f"{name}.key": one.key for name, one in (listeners | robots).items()}
         for name, key in keys.items():
             if key is not None and not PUBLIC_KEY.fullmatch(key):
                 raise DataError(
@@ -167,16 +167,6 @@ class AddressBook:
     def key_of(self, index: int) -> str | None:
         """Return the public key of a process by its index in messages."""
         return (self.listener(index) if index in (WORLD, SUPERVISOR) else self.robots[index]).key
-
-    def _addresses(self) -> Iterator[tuple[str, str]]:
-        yield "world.address", self.world.address
-        yield "supervisor.address", self.supervisor.address
-
-    def _keys(self) -> Iterator[tuple[str, str | None]]:
-        yield "world.key", self.world.key
-        yield "supervisor.key", self.supervisor.key
-        for k, robot in enumerate(self.robots):
-            yield f"robots[{k}].key", robot.key
 
 
 def _host(name: str, address: str) -> IPv4Address:
@@ -228,12 +218,14 @@ def local_book(robots: int, keys: dict[int, KeyPair] | None = None) -> AddressBo
         for each in sockets:
             each.bind(("127.0.0.1", 0))
         addresses = [f"tcp://127.0.0.1:{each.getsockname()[1]}" for each in sockets]
-    public = {index: pair.public for index, pair in (keys or {}).items()}
-    return AddressBook(
-        Listener(addresses[0], public.get(WORLD)),
-        Listener(addresses[1], public.get(SUPERVISOR)),
-        tuple(RobotEntry(public.get(k)) for k in range(robots)),
-    )
+    return _book(addresses, robots, keys or {})
+
+
+def _book(addresses: Sequence[str], robots: int, keys: Mapping[int, KeyPair]) -> AddressBook:
+    """Return the book of a team by the addresses of the world and the supervisor, and the keys of all."""
+    public = {index: pair.public for index, pair in keys.items()}
+    world, supervisor = (Listener(addresses[i], public.get(k)) for i, k in enumerate((WORLD, SUPERVISOR)))
+    return AddressBook(world, supervisor, tuple(RobotEntry(public.get(k)) for k in range(robots)))
 
 
 def key_file(index: int) -> str:
@@ -261,13 +253,8 @@ def make_team_files(folder: Path, robots: int, hosts: tuple[str, str], port: int
     if not 1 <= robots <= MOST_ROBOTS:
         raise DataError("--robots", robots, f"a whole number from 1 to {MOST_ROBOTS}")
     keys = {index: make_keys() for index in (WORLD, SUPERVISOR, *range(robots))}
-    public = {index: pair.public for index, pair in keys.items()}
     try:
-        book = AddressBook(
-            Listener(f"tcp://{hosts[0]}:{port}", public[WORLD]),
-            Listener(f"tcp://{hosts[1]}:{port + 1}", public[SUPERVISOR]),
-            tuple(RobotEntry(public[k]) for k in range(robots)),
-        )
+        book = _book([f"tcp://{host}:{port + k}" for k, host in enumerate(hosts)], robots, keys)
     except DataError as error:
         option = "--supervisor and --port" if error.key == "supervisor.address" else "--world and --port"
         raise DataError(option, error.value, error.allowed) from error
