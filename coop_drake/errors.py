@@ -13,6 +13,13 @@ _MOST_FAULTS = 20
 """Faults of a file that a message lists."""
 
 
+class Finding(str):
+    """What was found in place of a value, such as ``no such file``; messages show it without quotes."""
+
+    def __repr__(self) -> str:
+        return str(self)
+
+
 def shortened(value: object) -> str:
     """Return a value as text for a message, shortened if it is long."""
     text = repr(value)
@@ -53,7 +60,8 @@ class ScenarioError(CoopDrakeError):
     ) -> None:
         self.file, self.key, self.value, self.allowed, self.others = file, key, value, allowed, tuple(others)
         lines = [
-            f"{file}: {place}: {shortened(found)} is not allowed; expected {wanted}"
+            f"{file}: {place}: {shortened(found)}{'' if isinstance(found, Finding) else ' is not allowed'}; "
+            f"expected {wanted}"
             for place, found, wanted in ((key, value, allowed), *self.others[: _MOST_FAULTS - 1])
         ]
         more = len(self.others) + 1 - _MOST_FAULTS

@@ -284,7 +284,7 @@ def adapter(kind: Any) -> TypeAdapter[Any]:
     """Return pydantic's adapter of lists of a type; it takes no settings for a dataclass itself."""
     from pydantic import TypeAdapter
 
-    return TypeAdapter(list[kind], config={"extra": "forbid"})
+    return TypeAdapter(list[kind], config={"extra": "forbid", "allow_inf_nan": False})
 
 
 @_cache
@@ -295,14 +295,16 @@ def _validator(kind: Any) -> SchemaValidator:
 
 
 def _strict(schema: Any) -> Any:
-    """Return a schema by which no text is a number, no number a truth value, and all numbers are finite."""
+    """Return a schema by which no text is a number, and no number a truth value.
+
+    Pydantic's own strictness, as a setting, would also refuse lists for tuples and mappings for dataclasses.
+    """
     if isinstance(schema, list):
         return [_strict(part) for part in schema]
     if not isinstance(schema, dict):
         return schema
     own = {"strict": True} if schema.get("type") in ("bool", "int", "float", "str") else {}
-    finite = {"allow_inf_nan": False} if schema.get("type") == "float" else {}
-    return {name: _strict(part) for name, part in schema.items()} | own | finite
+    return {name: _strict(part) for name, part in schema.items()} | own
 
 
 _NAMES = "one of the keys", "a text as the name"

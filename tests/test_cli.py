@@ -301,7 +301,7 @@ def test_a_missing_file_and_an_unknown_gain_set_are_bad_input(room, tmp_path):
     missing = invoke("plan", tmp_path / "nowhere.yaml", "--json")
     assert missing.exit_code == 2
     assert "nowhere.yaml" in json.loads(missing.stdout)["error"]
-    assert "'no such file' is not allowed" in json.loads(missing.stdout)["error"]
+    assert "the file: no such file; expected a readable file" in json.loads(missing.stdout)["error"]
     gains = invoke("plan", room, "--gains", "tabel_2", "--json")
     assert gains.exit_code == 2
     facts = json.loads(gains.stdout)

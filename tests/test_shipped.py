@@ -39,7 +39,9 @@ def test_a_folder_stands_for_the_only_scenario_in_it(tmp_path, monkeypatch):
     assert scenario_file("base") == Path("base/mine.scenario.yaml")
     (tmp_path / "base").rename("both")
     (tmp_path / "both" / "other.scenario.yaml").write_text("two", encoding="utf-8")
-    with pytest.raises(ScenarioError, match=r"both: the file: 'a folder' .* just one \*.scenario.yaml"):
+    with pytest.raises(
+        ScenarioError, match=r"both: the file: a folder; expected .* just one \*.scenario.yaml"
+    ):
         load_scenario("both")
 
 

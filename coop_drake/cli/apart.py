@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -12,22 +13,18 @@ from coop_drake.apart import REJOIN
 from coop_drake.cli.options import (
     FaultsFile,
     FreeRunning,
-    FreshMaps,
     GainsName,
-    Live,
-    Machine,
-    NoFigures,
-    Quiet,
     Rejoin,
     ResultsFolder,
+    RunOptions,
     ScenarioPath,
-    Verbose,
-    Wait,
+    TableOptions,
+    command,
     out_folder,
 )
-from coop_drake.cli.reporter import ExitCode, Reporter, reporting
+from coop_drake.cli.reporter import ExitCode, Reporter
 from coop_drake.cli.results import ResultFolder
-from coop_drake.cli.run import carry_out, faults_of, live_page
+from coop_drake.cli.run import carry_out, faults_of
 from coop_drake.cli.simulate import read_plan
 from coop_drake.cli.task import Task, map_cells, read_task
 from coop_drake.viz.drawing_processes import DrawingProcesses
@@ -83,7 +80,9 @@ PlanFile = Annotated[
 
 
 @apart_app.command("keys")
+@command
 def keys_command(
+    reporter: Reporter,
     robots: Annotated[int, typer.Option("--robots", metavar="N", help="Number of robots.")] = 2,
     world: Annotated[
         str, typer.Option("--world", metavar="A.B.C.D", help="Address of the machine with the world.")
@@ -100,52 +99,48 @@ def keys_command(
         int, typer.Option("--port", metavar="P", help="First of two ports that processes listen on.")
     ] = _FIRST_PORT,
     out: Annotated[Path, out_folder("A new folder for the files.")] = Path("keys"),
-    machine: Machine = False,
-    quiet: Quiet = False,
 ) -> None:
     """Write an address book with public keys, and a private key for each process, for its owner alone."""
-    with reporting(machine=machine, quiet=quiet) as reporter:
-        from coop_drake.apart.team_files import make_team_files
-        from coop_drake.errors import ScenarioError
-        from coop_drake.typed_data import DataError
+    from coop_drake.apart.team_files import make_team_files
+    from coop_drake.errors import ScenarioError
+    from coop_drake.typed_data import DataError
 
-        try:
-            files = make_team_files(out, robots, (world, supervisor or world), port)
-        except DataError as error:
-            raise ScenarioError("the options", error.key, error.value, error.allowed) from error
-        reporter.facts.update(files=[str(path) for path in files])
-        reporter.say(f"Written: {', '.join(escape(str(path)) for path in files)}")
-        reporter.say(
-            f"Next: copy {escape(files[0].name)} to every machine, and each .key to that of its process"
-        )
+    try:
+        files = make_team_files(out, robots, (world, supervisor or world), port)
+    except DataError as error:
+        raise ScenarioError("the options", error.key, error.value, error.allowed) from error
+    reporter.facts.update(files=[str(path) for path in files])
+    reporter.say(f"Written: {', '.join(escape(str(path)) for path in files)}")
+    reporter.say(f"Next: copy {escape(files[0].name)} to every machine, and each .key to that of its process")
 
 
 @apart_app.command("supervisor")
+@command
 def supervisor_command(
+    reporter: Reporter,
     scenario: ScenarioPath,
     addresses: Addresses = _ADDRESSES,
     key: OwnKey = None,
     plan: PlanFile = None,
     gains: GainsName = None,
     faults: FaultsFile = None,
-    machine: Machine = False,
-    quiet: Quiet = False,
 ) -> None:
     """Be the supervisor of a team, until the world says that the run is over."""
-    with reporting(machine=machine, quiet=quiet) as reporter:
-        from coop_drake.apart import run_node
-        from coop_drake.apart.messages import SUPERVISOR
+    from coop_drake.apart import run_node
+    from coop_drake.apart.messages import SUPERVISOR
 
-        task, found = _problem_of(scenario, gains, plan, reporter)
-        network = _network_of(task, found, addresses, key, faults, SUPERVISOR)
-        reporter.say("The supervisor looks for the world and waits for all robots")
-        outcome = run_node(task.scenario, found, (), SUPERVISOR, network)
-        reporter.facts.update(outcome=outcome)
-        reporter.code = ExitCode.DONE if outcome == 0 else ExitCode.FAILED_RUN
+    task, found = _problem_of(scenario, gains, plan, reporter)
+    network = _network_of(task, found, addresses, key, faults, SUPERVISOR)
+    reporter.say("The supervisor looks for the world and waits for all robots")
+    outcome = run_node(task.scenario, found, (), SUPERVISOR, network)
+    reporter.facts.update(outcome=outcome)
+    reporter.code = ExitCode.DONE if outcome == 0 else ExitCode.FAILED_RUN
 
 
 @apart_app.command("robot")
+@command
 def robot_command(
+    reporter: Reporter,
     scenario: ScenarioPath,
     robot: Annotated[int, typer.Argument(metavar="K", min=0, help="Which robot, counted from 0.")],
     addresses: Addresses = _ADDRESSES,
@@ -153,27 +148,26 @@ def robot_command(
     plan: PlanFile = None,
     gains: GainsName = None,
     faults: FaultsFile = None,
-    machine: Machine = False,
-    quiet: Quiet = False,
 ) -> None:
     """Be one robot of a team, until the world says that the run is over."""
-    with reporting(machine=machine, quiet=quiet) as reporter:
-        from coop_drake.apart import robots_of, run_node
+    from coop_drake.apart import robots_of, run_node
 
-        task, found = _problem_of(scenario, gains, plan, reporter)
-        robots = robots_of(task.scenario)
-        if robot >= robots:
-            raise typer.BadParameter(f"K = {robot}: the team has robots 0 to {robots - 1}.")
-        network = _network_of(task, found, addresses, key, faults, robot)
-        maps = map_cells(task, found, reporter)
-        reporter.say(f"Robot {robot} looks for the world and the supervisor")
-        outcome = run_node(task.scenario, found, maps, robot, network)
-        reporter.facts.update(robot=robot, outcome=outcome)
-        reporter.code = ExitCode.DONE if outcome == 0 else ExitCode.FAILED_RUN
+    task, found = _problem_of(scenario, gains, plan, reporter)
+    robots = robots_of(task.scenario)
+    if robot >= robots:
+        raise typer.BadParameter(f"K = {robot}: the team has robots 0 to {robots - 1}.")
+    network = _network_of(task, found, addresses, key, faults, robot)
+    maps = map_cells(task, found, reporter)
+    reporter.say(f"Robot {robot} looks for the world and the supervisor")
+    outcome = run_node(task.scenario, found, maps, robot, network)
+    reporter.facts.update(robot=robot, outcome=outcome)
+    reporter.code = ExitCode.DONE if outcome == 0 else ExitCode.FAILED_RUN
 
 
 @apart_app.command("world")
+@partial(command, output=TableOptions)
 def world_command(
+    reporter: Reporter,
     scenario: ScenarioPath,
     addresses: Addresses = _ADDRESSES,
     key: OwnKey = None,
@@ -183,36 +177,25 @@ def world_command(
     faults: FaultsFile = None,
     free_running: FreeRunning = False,
     rejoin: Rejoin = REJOIN,
-    fresh_maps: FreshMaps = False,
-    live: Live = False,
-    wait: Wait = False,
-    no_figures: NoFigures = False,
-    machine: Machine = False,
-    quiet: Quiet = False,
-    verbose: Verbose = False,
+    *,
+    options: RunOptions,
 ) -> None:
     """Simulate and record a team whose robots and supervisor are processes of their own."""
-    with reporting(machine=machine, quiet=quiet, verbose=verbose) as reporter:
-        from coop_drake.apart import run_world, wall_clock
-        from coop_drake.apart.messages import WORLD
+    from coop_drake.apart import run_world, wall_clock
+    from coop_drake.apart.messages import WORLD
 
-        task, found = _problem_of(scenario, gains, plan, reporter)
-        folder = ResultFolder.of(task.name, out, "simulation")
-        network = _network_of(task, found, addresses, key, faults, WORLD)
-        pacing = wall_clock(task.scenario) if free_running else None
-        reporter.say("The world waits for the supervisor and all robots")
-        with (
-            DrawingProcesses(figures=not no_figures) as drawing,
-            live_page(task, found, reporter, live=live, wait=wait) as page,
-        ):
+    task, found = _problem_of(scenario, gains, plan, reporter)
+    folder = ResultFolder.of(task.name, out, "simulation")
+    network = _network_of(task, found, addresses, key, faults, WORLD)
+    pacing = wall_clock(task.scenario) if free_running else None
+    reporter.say("The world waits for the supervisor and all robots")
 
-            def world(scenario: Scenario, plan: Plan, maps: Any, **options: Any) -> SimulationLog:
-                options |= {"report": reporter.facts.update, "tell": reporter.say, "pacing": pacing}
-                return run_world(scenario, plan, network, rejoin=rejoin, **options)
+    def world(scenario: Scenario, plan: Plan, maps: Any, **options: Any) -> SimulationLog:
+        options |= {"report": reporter.facts.update, "tell": reporter.say, "pacing": pacing}
+        return run_world(scenario, plan, network, rejoin=rejoin, **options)
 
-            reporter.code = carry_out(
-                task, found, folder, reporter, drawing, page, world, fresh_maps=fresh_maps
-            )
+    with DrawingProcesses(figures=not options.no_figures) as drawing:
+        reporter.code = carry_out(task, found, folder, reporter, drawing, world, options)
 
 
 def _problem_of(

@@ -1,9 +1,9 @@
 """The commands, the headings that the help lists them under, and what commands of before are called now.
 
-A command is a function in the module of its name: ``coop-drake plan`` is ``plan_command`` in ``plan.py``; one
-with commands below it is a ``Typer``. The module lists examples of it in ``EXAMPLES``, which its help shows.
-It imports Drake, the planner and matplotlib when it is called, so that no command waits for what it does not
-need.
+A command is a function in the module of its name, which is given a reporter: ``coop-drake plan`` is
+``plan_command`` in ``plan.py``; one with commands below it is a ``Typer``. The module lists examples of it in
+``EXAMPLES``, which its help shows. It imports Drake, the planner and matplotlib when it is called, so that no
+command waits for what it does not need.
 
 A new command is a module here, an entry in ``_PANELS``, and a row in the README; a new option is an argument
 of its function.
@@ -40,7 +40,8 @@ from coop_drake.cli import (
     watch,
     why,
 )
-from coop_drake.cli.reporter import ExitCode, Reporter
+from coop_drake.cli.options import TableOptions, command
+from coop_drake.cli.reporter import ExitCode, Reporter, UsageError
 
 _PANELS: dict[str, tuple[ModuleType, ...]] = {
     "Carrying objects": (run, plan, simulate, tune, campaign, apart),
@@ -49,6 +50,9 @@ _PANELS: dict[str, tuple[ModuleType, ...]] = {
     "This machine": (doctor,),
 }
 """The modules of all commands, under the headings of the help and in its order."""
+
+_OUTPUTS = dict.fromkeys((run, plan, simulate), (TableOptions,))
+"""Commands whose closing table may have more rows."""
 
 _OLD_NAMES: dict[tuple[str, str], str] = {
     ("keys", ""): "is now `coop-drake apart keys`",
@@ -70,8 +74,6 @@ _OLD_NAMES: dict[tuple[str, str], str] = {
 }
 """Commands of before, each alone or with an option or a command below it, and what takes their place."""
 
-_UsageError: Any = typer.BadParameter.__base__  # The same base in typer's own click and in the package click.
-
 
 class _Commands(TyperGroup):
     """Refuses commands and options of before by their new names."""
@@ -79,9 +81,9 @@ class _Commands(TyperGroup):
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Look for old names among the arguments, options cut at their ``=``."""
         words = [word.partition("=")[0] for word in args]
-        for (command, part), now in () if ctx.resilient_parsing else _OLD_NAMES.items():
-            if words[:1] == [command] and (not part or part in words[1:]):
-                raise _UsageError(f"`{' '.join(filter(None, (command, part)))}` {now}.", ctx)
+        for (name, part), now in () if ctx.resilient_parsing else _OLD_NAMES.items():
+            if words[:1] == [name] and (not part or part in words[1:]):
+                raise UsageError(f"`{' '.join(filter(None, (name, part)))}` {now}.", ctx)
         return super().parse_args(ctx, args)
 
 
@@ -108,7 +110,7 @@ def main() -> None:
         code = app(arguments, standalone_mode=False)
         if code == ExitCode.INTERRUPTED and not Reporter.complained:  # before or after the command itself
             raise KeyboardInterrupt
-    except _UsageError as error:
+    except UsageError as error:
         error.show()
         if "--json" in arguments:
             sys.stdout.write(json.dumps({"error": error.format_message()}) + "\n")
@@ -145,4 +147,5 @@ for _panel, _modules in _PANELS.items():
         if _group := getattr(_module, f"{_word}_app", None):
             app.add_typer(_group, **_said, rich_help_panel=_panel)
         else:
-            app.command(**_said, rich_help_panel=_panel)(getattr(_module, f"{_word}_command"))
+            _made = command(getattr(_module, f"{_word}_command"), *_OUTPUTS.get(_module, ()))
+            app.command(**_said, rich_help_panel=_panel)(_made)

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from rich.markup import escape
 
-from coop_drake.cli.options import FirstByDefault, Machine, NoFigures, Quiet, out_folder
-from coop_drake.cli.reporter import ExitCode, Reporter, reporting
+from coop_drake.cli.options import ApartOptions, FirstByDefault, NoFigures, RunOptions, command, out_folder
+from coop_drake.cli.reporter import ExitCode, Reporter
 from coop_drake.cli.results import ResultFolder
 from coop_drake.cli.run import carry_out, simulation_of
 from coop_drake.cli.task import Task
@@ -54,7 +54,9 @@ CampaignOut = Annotated[
 
 
 @campaign_app.command("run")
+@command
 def run_command(
+    reporter: Reporter,
     file: CampaignFile,
     out: CampaignOut = None,
     workers: Annotated[
@@ -69,74 +71,64 @@ def run_command(
             help="A Dask scheduler that exists, in place of workers that are started here.",
         ),
     ] = None,
-    machine: Machine = False,
-    quiet: Quiet = False,
 ) -> None:
     """Make all runs of a campaign, or those that an interruption left.
 
     `campaign FILE` means the same. The exit code is 1 if a run was lost.
     """
-    with reporting(machine=machine, quiet=quiet) as reporter:
-        campaign, folder = _read(file, out)
-        from coop_drake.campaign.execution import run_campaign
+    campaign, folder = _read(file, out)
+    from coop_drake.campaign.execution import run_campaign
 
-        with reporter.stage("campaign", "campaign") as progress:
-            outcome = run_campaign(
-                campaign, folder.path, workers=workers, scheduler=scheduler, progress=progress
-            )
-        reporter.facts["batches_made"] = outcome.made
-        _show_state(campaign, folder, outcome.batches, reporter)
+    with reporter.stage("campaign", "campaign") as progress:
+        outcome = run_campaign(campaign, folder.path, workers=workers, scheduler=scheduler, progress=progress)
+    reporter.facts["batches_made"] = outcome.made
+    _show_state(campaign, folder, outcome.batches, reporter)
 
 
 @campaign_app.command("status")
-def status_command(
-    file: CampaignFile, out: CampaignOut = None, machine: Machine = False, quiet: Quiet = False
-) -> None:
+@command
+def status_command(reporter: Reporter, file: CampaignFile, out: CampaignOut = None) -> None:
     """Show how far a campaign is, and what it has found so far."""
-    with reporting(machine=machine, quiet=quiet) as reporter:
-        campaign, folder, batches = _with_batches(file, out)
-        _show_state(campaign, folder, batches, reporter)
-        reporter.code = ExitCode.DONE
+    campaign, folder, batches = _with_batches(file, out)
+    _show_state(campaign, folder, batches, reporter)
+    reporter.code = ExitCode.DONE
 
 
 @campaign_app.command("report")
-def report_command(
-    file: CampaignFile, out: CampaignOut = None, machine: Machine = False, quiet: Quiet = False
-) -> None:
+@command
+def report_command(reporter: Reporter, file: CampaignFile, out: CampaignOut = None) -> None:
     """Write report.html and report.json: rates with bounds, distributions, the worst runs."""
-    with reporting(machine=machine, quiet=quiet) as reporter:
-        from coop_drake.campaign.report import make_report, write_report
+    from coop_drake.campaign.report import make_report, write_report
 
-        campaign, folder, batches = _with_batches(file, out)
-        report = make_report(
-            campaign.name,
-            folder.table(batches),
-            facts=_facts(campaign, folder.by_other_sources(batches)),
-            missing=len(folder.missing(batches)),
-        )
-        at = [] if out is None else ["--out", str(out)]
-        command = ["coop-drake", "campaign", "replay", str(file)]
-        written = write_report(report, folder.path, lambda run: shlex.join([*command, str(run.run), *at]))
-        reporter.facts["files"] = [str(path) for path in written]
-        reporter.say(f"The report is {escape(str(written[0]))}; open it in a browser")
+    campaign, folder, batches = _with_batches(file, out)
+    report = make_report(
+        campaign.name,
+        folder.table(batches),
+        facts=_facts(campaign, folder.by_other_sources(batches)),
+        missing=len(folder.missing(batches)),
+    )
+    at = [] if out is None else ["--out", str(out)]
+    command = ["coop-drake", "campaign", "replay", str(file)]
+    written = write_report(report, folder.path, lambda run: shlex.join([*command, str(run.run), *at]))
+    reporter.facts["files"] = [str(path) for path in written]
+    reporter.say(f"The report is {escape(str(written[0]))}; open it in a browser")
 
 
 @campaign_app.command("replay")
+@command
 def replay_command(
+    reporter: Reporter,
     file: CampaignFile,
     run: Annotated[int, typer.Argument(metavar="RUN", min=0, help="Index of the run in the campaign.")],
     out: CampaignOut = None,
     no_figures: NoFigures = False,
-    machine: Machine = False,
-    quiet: Quiet = False,
 ) -> None:
     """Make one run again by Drake's loop, with recording and figures, and compare it with the counted one.
 
     A run of the compiled tier is made again by the compiled loop, too.
     """
-    with reporting(machine=machine, quiet=quiet) as reporter:
-        campaign, folder, batches = _with_batches(file, out)
-        reporter.code = _replay(campaign, folder, batches, run, reporter, figures=not no_figures)
+    campaign, folder, batches = _with_batches(file, out)
+    reporter.code = _replay(campaign, folder, batches, run, reporter, figures=not no_figures)
 
 
 def _read(file: Path, out: Path | None) -> tuple[Campaign, CampaignFolder]:
@@ -229,9 +221,9 @@ def _replay(
     task = Task(scenario, planning_problem(scenario))
     results = ResultFolder.of(task.name, folder.path / "replays" / str(index), "simulation")
     counted = _counted(index, "drake", folder, batches)
-    simulation = simulation_of(task, reporter)
+    simulation = simulation_of(task, reporter, ApartOptions())
     with DrawingProcesses(figures=figures) as drawing:
-        code = carry_out(task, plan, results, reporter, drawing, None, simulation, fresh_maps=False)
+        code = carry_out(task, plan, results, reporter, drawing, simulation, RunOptions())
     log = SimulationLog.load(results.path / "log.npz")
     digest = run_digest(scenario, plan_digest(plan), "drake")
     drake = record_of_log(run, scenario.name, log, plan, digest)

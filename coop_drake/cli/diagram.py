@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Annotated
 
 import typer
 from rich.markup import escape
 
-from coop_drake.cli.options import PictureFolder, Quiet, ScenarioPath
+from coop_drake.cli.options import PictureFolder, ScenarioPath
 from coop_drake.cli.plan import plan_of
-from coop_drake.cli.reporter import ExitCode, Reporter, reporting
+from coop_drake.cli.reporter import Reporter
 from coop_drake.cli.results import ResultFolder
 from coop_drake.cli.task import map_cells, read_task
 
@@ -20,19 +19,14 @@ EXAMPLES = (
 
 
 def diagram_command(
+    reporter: Reporter,
     scenario: ScenarioPath,
     robot: Annotated[
         int, typer.Option("--robot", metavar="K", min=0, help="Whose controller is opened.")
     ] = 0,
     out: PictureFolder = None,
-    quiet: Quiet = False,
 ) -> None:
     """Draw the blocks of the closed loop and of one robot's controller, as they are wired in Drake."""
-    with reporting(quiet=quiet) as reporter:
-        reporter.code = _draw(scenario, robot, out, reporter)
-
-
-def _draw(scenario: Path, robot: int, out: Path | None, reporter: Reporter) -> ExitCode:
     from coop_drake.diagram import build_closed_loop
     from coop_drake.drawing import save_figure
     from coop_drake.errors import ScenarioError
@@ -47,11 +41,10 @@ def _draw(scenario: Path, robot: int, out: Path | None, reporter: Reporter) -> E
     folder = ResultFolder.of(task.name, out, "diagram")
     plan = plan_of(task, None, reporter)
     if plan is None:
-        return reporter.code
+        return
     loop = build_closed_loop(task.scenario, plan, map_cells(task, plan, reporter))
     folder.begin("diagram")
     picture = folder.path / "diagram.svg"
     with reporter.stage("drawing"):
         save_figure(block_diagram_figure(loop, robot), picture)
     reporter.say(f"The picture is in {escape(str(picture))}")
-    return ExitCode.DONE

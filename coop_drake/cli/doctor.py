@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import platform
+import subprocess
 import sys
 import tempfile
 from collections.abc import Callable, Iterator
@@ -14,13 +15,17 @@ from typing import Annotated
 import typer
 from rich.markup import escape
 
-from coop_drake.cli.options import Machine
-from coop_drake.cli.reporter import ExitCode, Reporter, reporting
+from coop_drake.cli.reporter import ExitCode, Reporter
 from coop_drake.cli.task import map_cache
-from coop_drake.cli.warm import compile_kernels
 
 _LEAST_MEMORY = 1.0
 """Memory that a run needs, with a reserve: it peaks at about 0.6 [GB]."""
+
+_PROCESSES = (
+    ("coop_drake.planning.warm_up",),
+    ("coop_drake.harmonic_maps.warm_up", "coop_drake.compiled_loop.warm_up"),
+)
+"""Modules that compile kernels, those of a process one after the other; both processes take about as long."""
 
 _MARKS = {True: "[green]ok[/]", False: "[red]wrong[/]", None: "[yellow]note[/]"}
 
@@ -50,6 +55,7 @@ class Finding:
 
 
 def doctor_command(
+    reporter: Reporter,
     warm: Annotated[
         bool,
         typer.Option("--warm", help="Compile all kernels ahead, so that the next command starts at once."),
@@ -58,20 +64,41 @@ def doctor_command(
         bool, typer.Option("--maps", help="Show where solved maps are kept for later runs.")
     ] = False,
     clear_maps: Annotated[bool, typer.Option("--clear-maps", help="Delete all solved maps.")] = False,
-    machine: Machine = False,
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Show only what is wrong.")] = False,
 ) -> None:
     """Check the installation: versions, Drake, Meshcat, fonts, compiled parts, memory, caches.
 
     With an option it does what that says instead.
     """
-    with reporting(machine=machine, quiet=quiet) as reporter:
-        if warm:
-            compile_kernels(reporter)
-        if maps or clear_maps:
-            _show_maps(reporter, clear=clear_maps)
-        if not (warm or maps or clear_maps):
-            _diagnose(reporter)
+    if warm:
+        _compile_kernels(reporter)
+    if maps or clear_maps:
+        _show_maps(reporter, clear=clear_maps)
+    if not (warm or maps or clear_maps):
+        _diagnose(reporter)
+
+
+def _compile_kernels(reporter: Reporter) -> None:
+    """Compile all kernels, so that the next command starts at once; `make` does it when it sets up."""
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}  # They find what this one finds.
+    programs = ["".join(f"import {one} as part; part.main()\n" for one in modules) for modules in _PROCESSES]
+    processes = [
+        subprocess.Popen(
+            [sys.executable, "-P", "-c", program],
+            env=environment,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+        )
+        for program in programs
+    ]
+    with reporter.stage("compiling") as progress:
+        try:
+            for count, process in enumerate(processes):
+                process.wait()
+                progress("", (count + 1) / len(processes))
+        finally:
+            for process in processes:
+                process.kill()
+                process.wait()
 
 
 def _diagnose(reporter: Reporter) -> None:

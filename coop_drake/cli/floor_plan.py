@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated, cast
 import typer
 from rich.markup import escape
 
-from coop_drake.cli.options import Machine, Quiet, out_file
-from coop_drake.cli.reporter import Reporter, reporting
+from coop_drake.cli.options import out_file
+from coop_drake.cli.reporter import Reporter
 
 if TYPE_CHECKING:
     from coop_drake.floor_plans import FloorPlan
@@ -28,6 +28,7 @@ EXAMPLES = (
 
 
 def floor_plan_command(
+    reporter: Reporter,
     file: Annotated[
         Path, typer.Argument(metavar="FILE", help="*.svg, *.dxf, *.geojson, *.wkt, or a ROS map's *.yaml.")
     ],
@@ -61,8 +62,6 @@ def floor_plan_command(
         bool, typer.Option("--unknown-is-free", help="Take a map's unknown cells for floor.")
     ] = False,
     out: Annotated[list[Path] | None, out_file("*.yaml: workspace; *.png or *.svg: picture.")] = None,
-    machine: Machine = False,
-    quiet: Quiet = False,
 ) -> None:
     """Read a floor plan that another program wrote: preview it, or turn it into a scenario's workspace."""
     targets = out or []
@@ -71,18 +70,17 @@ def floor_plan_command(
             raise typer.BadParameter(f"{target} ends neither in .yaml nor in .png or .svg.")
         if target.resolve() == file.resolve():
             raise typer.BadParameter(f"{target} is the floor plan itself.")
-    with reporting(machine=machine, quiet=quiet) as reporter:
-        from coop_drake.floor_plans import FloorPlanSettings, Inside, read_floor_plan
+    from coop_drake.floor_plans import FloorPlanSettings, Inside, read_floor_plan
 
-        settings = FloorPlanSettings(
-            cast("Unit | None", unit), scale, tuple(layer or ()), tolerance, gap, unknown_is_free
-        )
-        with reporter.stage("reading"):
-            plan = read_floor_plan(file, settings, Inside(*inside, "--inside") if inside else None)
-        _tell(plan, file, reporter)
-        for target in targets:
-            _write(plan, file, target, inside)
-            reporter.say(f"Written: {escape(str(target))}")
+    settings = FloorPlanSettings(
+        cast("Unit | None", unit), scale, tuple(layer or ()), tolerance, gap, unknown_is_free
+    )
+    with reporter.stage("reading"):
+        plan = read_floor_plan(file, settings, Inside(*inside, "--inside") if inside else None)
+    _tell(plan, file, reporter)
+    for target in targets:
+        _write(plan, file, target, inside)
+        reporter.say(f"Written: {escape(str(target))}")
 
 
 def _tell(plan: FloorPlan, file: Path, reporter: Reporter) -> None:

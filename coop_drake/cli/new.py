@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from rich.markup import escape
 
-from coop_drake.cli.options import FirstByDefault, Machine, Quiet, out_folder
-from coop_drake.cli.reporter import ExitCode, Reporter, reporting
+from coop_drake.cli.options import FirstByDefault, command, out_folder
+from coop_drake.cli.reporter import ExitCode, Reporter
 
 if TYPE_CHECKING:
     from coop_drake.answers import PlanningProblem
@@ -47,7 +47,9 @@ new_app = typer.Typer(
 
 
 @new_app.command("scenario")
+@command
 def scenario_command(
+    reporter: Reporter,
     name: Annotated[str, typer.Argument(metavar="NAME", help="Name of scenario and folder.")],
     robots: Annotated[
         int | None, typer.Option("--robots", metavar="N", help="Number of robots, 2 to 6; default 2.")
@@ -108,8 +110,6 @@ def scenario_command(
     ] = None,
     out: Annotated[Path | None, out_folder("The folder; NAME by default.")] = None,
     force: Annotated[bool, typer.Option("--force", help="Replace files that are there already.")] = False,
-    machine: Machine = False,
-    quiet: Quiet = False,
 ) -> None:
     """Write a scenario and its models to start from; at a terminal, ask for what no option says.
 
@@ -122,7 +122,7 @@ def scenario_command(
         "length": length,
         "width": width,
     }
-    if sys.stdin.isatty() and sys.stdout.isatty() and not (machine or quiet):
+    if sys.stdin.isatty() and sys.stdout.isatty() and not reporter.silent:
         flags = _asked(flags)
     said: dict[str, Any] = {key: value for key, value in flags.items() if value is not None}
     if "arm" in said:
@@ -132,13 +132,12 @@ def scenario_command(
         if given and floor_plan is None:
             raise typer.BadParameter(f"{flag} is for a floor plan; name it with --floor-plan.")
     folder = out if out is not None else Path(name)
-    with reporting(machine=machine, quiet=quiet) as reporter:
-        from coop_drake.scenario.starter import Starter, usual_length
+    from coop_drake.scenario.starter import Starter, usual_length
 
-        said.setdefault("length", usual_length(said.get("robots", 2)))
-        workspace = None if floor_plan is None else _section(floor_plan, unit, scale, layer, folder)
-        starter = Starter(name, **said, door=door, workspace=workspace, start=start, goal=goal)
-        reporter.code = _write(starter, folder, reporter, force=force)
+    said.setdefault("length", usual_length(said.get("robots", 2)))
+    workspace = None if floor_plan is None else _section(floor_plan, unit, scale, layer, folder)
+    starter = Starter(name, **said, door=door, workspace=workspace, start=start, goal=goal)
+    reporter.code = _write(starter, folder, reporter, force=force)
 
 
 def _asked(flags: dict[str, Any]) -> dict[str, Any]:
@@ -226,7 +225,9 @@ def _write(starter: Starter, folder: Path, reporter: Reporter, *, force: bool) -
 
 
 @new_app.command("object")
+@command
 def object_command(
+    reporter: Reporter,
     name: Annotated[str, typer.Argument(metavar="NAME", help="Name of the model and of its files.")],
     corners: Annotated[
         str,
@@ -256,28 +257,25 @@ def object_command(
     ] = None,
     out: Annotated[Path, out_folder("The folder; this one by default.")] = Path(),
     force: Annotated[bool, typer.Option("--force", help="Replace files that are there already.")] = False,
-    machine: Machine = False,
-    quiet: Quiet = False,
 ) -> None:
     """Write the model of a polygonal object: an SDF file, and a mesh for each convex part."""
     outline, frames = _rows(corners, 2, "--corners"), _rows(grasps, 3, "--grasps")
     _check_name(name)
-    with reporting(machine=machine, quiet=quiet) as reporter:
-        from coop_drake.errors import ScenarioError
-        from coop_drake.plant.model_writing import polygon_body_files, write_polygon_body
+    from coop_drake.errors import ScenarioError
+    from coop_drake.plant.model_writing import polygon_body_files, write_polygon_body
 
-        files = polygon_body_files(
-            outline, mass, name, height, inertia=inertia, elevation=elevation, grasps=frames
-        )
-        for file in files:
-            if (out / file).exists() and not force:
-                raise ScenarioError(str(out / file), "--out", str(out), "a folder without it, or --force")
-        path = write_polygon_body(files, out)
-        reporter.facts.update(model=str(path), files=sorted(str(out / file) for file in files))
-        reporter.say(f"The model is {escape(str(path))}; a scenario uses it with these lines:\n")
-        reporter.say(f"- add_model: {{name: object, file: {escape(path.as_posix())}}}")
-        for k in range(len(frames)):
-            reporter.say(f"- add_weld: {{parent: object::grasp_{k}, child: robot_{k}::gripper}}")
+    files = polygon_body_files(
+        outline, mass, name, height, inertia=inertia, elevation=elevation, grasps=frames
+    )
+    for file in files:
+        if (out / file).exists() and not force:
+            raise ScenarioError(str(out / file), "--out", str(out), "a folder without it, or --force")
+    path = write_polygon_body(files, out)
+    reporter.facts.update(model=str(path), files=sorted(str(out / file) for file in files))
+    reporter.say(f"The model is {escape(str(path))}; a scenario uses it with these lines:\n")
+    reporter.say(f"- add_model: {{name: object, file: {escape(path.as_posix())}}}")
+    for k in range(len(frames)):
+        reporter.say(f"- add_weld: {{parent: object::grasp_{k}, child: robot_{k}::gripper}}")
 
 
 def _check_name(name: str) -> None:

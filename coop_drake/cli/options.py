@@ -1,13 +1,19 @@
-"""Arguments that several commands have, and what a shell offers for them when the tab key is pressed."""
+"""Commands from functions, arguments that several of them have, and what a shell offers for these."""
 
 from __future__ import annotations
 
+import inspect
+from collections.abc import Callable
+from dataclasses import dataclass, fields, is_dataclass
+from functools import wraps
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, get_type_hints
 
 import typer
 from typer.core import TyperGroup
 
+from coop_drake.apart import REJOIN, RESTARTS
+from coop_drake.cli.reporter import reporting
 from coop_drake.shipped import scenario_file, shipped_scenarios
 
 _ENDING = ".scenario.yaml"
@@ -110,39 +116,7 @@ Effort = Annotated[
 ]
 ResultsFolder = Annotated[Path | None, out_folder("Where results go; out/<scenario> by default.")]
 PictureFolder = Annotated[Path | None, out_folder("Where the picture goes; out/<scenario> by default.")]
-Machine = Annotated[
-    bool, typer.Option("--json", help="One JSON object on standard output, all else on standard error.")
-]
-Verbose = Annotated[
-    bool, typer.Option("--verbose", "-v", help="Show more rows in the closing table; --json has all facts.")
-]
-Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Show errors only.")]
-FreshMaps = Annotated[
-    bool,
-    typer.Option(
-        "--fresh-maps", help="Solve all maps anew; others come from the cache, see `doctor --maps`."
-    ),
-]
-Live = Annotated[
-    bool,
-    typer.Option("--live", help="Show the run in a browser while it is simulated, at most in real time."),
-]
-Wait = Annotated[
-    bool,
-    typer.Option(
-        "--wait",
-        help="Like --live, but begin only when a browser shows the page.",
-    ),
-]
 NoFigures = Annotated[bool, typer.Option("--no-figures", help="Write the recording, but no figures.")]
-Apart = Annotated[
-    bool,
-    typer.Option(
-        "--apart",
-        help="Run every robot and the supervisor as a process of its own; same results, bit for bit. Needs "
-        "`deployment: {control_rate}`.",
-    ),
-]
 FreeRunning = Annotated[
     bool,
     typer.Option(
@@ -158,15 +132,6 @@ FaultsFile = Annotated[
         help="YAML file of faults between processes: lost, late or repeated messages, and wrong clocks.",
     ),
 ]
-Restarts = Annotated[
-    int,
-    typer.Option(
-        "--restarts",
-        metavar="N",
-        min=0,
-        help="With --apart: how often a process that ends too early is started again.",
-    ),
-]
 Rejoin = Annotated[
     float,
     typer.Option(
@@ -176,3 +141,105 @@ Rejoin = Annotated[
         help="How long the team waits at rest for a process that does not answer, before the run ends.",
     ),
 ]
+
+
+@dataclass(frozen=True)
+class RunOptions:
+    """Options of the commands that carry out a plan: what is shown, and what is kept."""
+
+    fresh_maps: Annotated[
+        bool,
+        typer.Option(
+            "--fresh-maps", help="Solve all maps anew; others come from the cache, see `doctor --maps`."
+        ),
+    ] = False
+    live: Annotated[
+        bool,
+        typer.Option("--live", help="Show the run in a browser while it is simulated, at most in real time."),
+    ] = False
+    wait: Annotated[
+        bool, typer.Option("--wait", help="Like --live, but begin only when a browser shows the page.")
+    ] = False
+    no_figures: NoFigures = False
+
+
+@dataclass(frozen=True)
+class ApartOptions:
+    """Options of the commands that start a team whose robots are processes of their own."""
+
+    apart: Annotated[
+        bool,
+        typer.Option(
+            "--apart",
+            help="Run every robot and the supervisor as a process of its own; same results, bit for bit. "
+            "Needs `deployment: {control_rate}`.",
+        ),
+    ] = False
+    restarts: Annotated[
+        int,
+        typer.Option(
+            "--restarts",
+            metavar="N",
+            min=0,
+            help="With --apart: how often a process that ends too early is started again.",
+        ),
+    ] = RESTARTS
+    rejoin: Rejoin = REJOIN
+    faults: FaultsFile = None
+    free_running: FreeRunning = False
+
+
+@dataclass(frozen=True)
+class OutputOptions:
+    """Options of every command: for whom it reports."""
+
+    machine: Annotated[
+        bool, typer.Option("--json", help="One JSON object on standard output, all else on standard error.")
+    ] = False
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Show errors only.")] = False
+
+
+@dataclass(frozen=True)
+class TableOptions(OutputOptions):
+    """Those, and how much a closing table shows."""
+
+    verbose: Annotated[
+        bool,
+        typer.Option("--verbose", "-v", help="Show more rows in the closing table; --json has all facts."),
+    ] = False
+
+
+def command(function: Callable[..., None], output: type[OutputOptions] = OutputOptions) -> Any:
+    """Make a command of a function whose first argument is a reporter.
+
+    The command has the options of ``output``, by which it makes the reporter, and in place of an argument
+    whose type is a dataclass an option for each of its fields.
+    """
+    _, *own = inspect.signature(function).parameters.values()
+    hints: dict[str, Any] = {**get_type_hints(function, include_extras=True), "output": output}
+    listed: list[inspect.Parameter] = []
+    groups: dict[str, Any] = {name: kind for name, kind in hints.items() if is_dataclass(kind)}
+    for one in (*own, inspect.Parameter("output", inspect.Parameter.KEYWORD_ONLY)):
+        if one.name in groups:
+            kinds = get_type_hints(groups[one.name], include_extras=True)
+            entries = [(field.name, field.default, kinds[field.name]) for field in fields(groups[one.name])]
+        else:
+            entries = [(one.name, one.default, hints[one.name])]
+        listed += [
+            inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=kind)
+            for name, default, kind in entries
+        ]
+
+    @wraps(function)
+    def called(**values: Any) -> None:
+        made = {
+            name: kind(**{field.name: values.pop(field.name) for field in fields(kind)})
+            for name, kind in groups.items()
+        }
+        with reporting(**vars(made.pop("output"))) as reporter:
+            function(reporter, **values, **made)
+
+    made_command: Any = called
+    made_command.__signature__ = inspect.Signature(listed)
+    made_command.__annotations__ = {one.name: one.annotation for one in listed}
+    return made_command

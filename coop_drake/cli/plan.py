@@ -7,18 +7,9 @@ from typing import TYPE_CHECKING
 
 from rich.markup import escape
 
-from coop_drake.cli.options import (
-    BudgetName,
-    Effort,
-    GainsName,
-    Machine,
-    Quiet,
-    ResultsFolder,
-    ScenarioPath,
-    Verbose,
-)
+from coop_drake.cli.options import BudgetName, Effort, GainsName, ResultsFolder, ScenarioPath
 from coop_drake.cli.planning_process import beside, prepare_simulation
-from coop_drake.cli.reporter import ExitCode, Reporter, reporting
+from coop_drake.cli.reporter import ExitCode, Reporter
 from coop_drake.cli.results import ResultFolder
 from coop_drake.cli.summary import answer_of, planning_facts, summary_rows
 from coop_drake.cli.task import Task, read_task
@@ -34,22 +25,19 @@ EXAMPLES = (
 
 
 def plan_command(
+    reporter: Reporter,
     scenario: ScenarioPath,
     out: ResultsFolder = None,
     gains: GainsName = None,
     budget: BudgetName = None,
     effort: Effort = None,
-    machine: Machine = False,
-    quiet: Quiet = False,
-    verbose: Verbose = False,
 ) -> None:
     """Plan only: write a plan, a way that breaks a limit, or a proof that there is none."""
-    with reporting(machine=machine, quiet=quiet, verbose=verbose) as reporter:
-        task = read_task(scenario, gains, reporter)
-        folder = ResultFolder.of(task.name, out, "plan")
-        if plan_of(task, folder, reporter, budget, effort=effort):
-            reporter.table(task.name, summary_rows(reporter.facts, verbose=reporter.verbose))
-            reporter.say(f"The plan is in {escape(str(folder.plan))}")
+    task = read_task(scenario, gains, reporter)
+    folder = ResultFolder.of(task.name, out, "plan")
+    if plan_of(task, folder, reporter, budget, effort=effort):
+        reporter.table(task.name, summary_rows(reporter.facts, verbose=reporter.verbose))
+        reporter.say(f"The plan is in {escape(str(folder.plan))}")
 
 
 def plan_of(
@@ -95,14 +83,7 @@ def answer_to(
             reporter.say(f"[yellow]{escape(said)}; `verify` will refuse the plan[/]")
     with reporter.stage("planning", "planning", cpu=True) as progress:
         gain_set = task.scenario.gain_sets[name]
-        work = partial(
-            plan,
-            task.problem,
-            gain_set,
-            gain_set_name=name,
-            budget=tolerated,
-            effort=effort,
-        )
+        work = partial(plan, task.problem, gain_set, gain_set_name=name, budget=tolerated, effort=effort)
         if simulated:
             prepare = partial(prepare_simulation, task.scenario)
             result = beside(lambda advance: work(progress=advance), prepare, progress)

@@ -30,6 +30,9 @@ from coop_drake.errors import (
 from coop_drake.extras import install_advice
 from coop_drake.progress import Progress
 
+UsageError: Any = typer.BadParameter.__base__
+"""Wrong usage: the same base in typer's own click and in the package click."""
+
 _SMALLEST_STEP = 0.002
 """Fraction by which a bar moves on; smaller steps cannot be seen on a terminal [-]."""
 _NEARLY = 0.999
@@ -68,13 +71,14 @@ class Reporter:
         facts: What ``--json`` writes, by name.
         code: The exit code of the command.
         verbose: As given.
+        silent: Whether nobody reads what is shown but errors.
         complained: Whether any command of this process has shown an error.
     """
 
     complained = False
 
     def __init__(self, *, machine: bool, quiet: bool, verbose: bool = False) -> None:
-        self.verbose = verbose
+        self.verbose, self.silent = verbose, machine or quiet
         self.facts: dict[str, Any] = {}
         self.code = ExitCode.DONE
         self._machine = machine
@@ -235,7 +239,8 @@ def reporting(*, machine: bool = False, quiet: bool = False, verbose: bool = Fal
     ``verbose`` closing tables have more rows.
 
     Raises:
-        typer.Exit: Always, with the exit code, unless the body raises an error that is a bug.
+        typer.Exit: Always, with the exit code, unless the body raises an error that is a bug, or one that
+            says that the command was called wrongly.
     """
     reporter = Reporter(machine=machine, quiet=quiet, verbose=verbose)
     try:
@@ -244,8 +249,12 @@ def reporting(*, machine: bool = False, quiet: bool = False, verbose: bool = Fal
         except BaseException as error:
             if not _explain(error, reporter):
                 raise
-    finally:
+    except UsageError:  # Who calls the command says it, to machines, too.
+        raise
+    except BaseException:
         reporter.close()
+        raise
+    reporter.close()
     raise typer.Exit(int(reporter.code))
 
 
@@ -266,7 +275,7 @@ def _explain(error: BaseException, reporter: Reporter) -> bool:
     elif isinstance(error, OSError):
         text = _system_error(error)
     elif not isinstance(error, CoopDrakeError):
-        if isinstance(error, Exception):
+        if isinstance(error, Exception) and not isinstance(error, UsageError):
             reporter.complain(f"{type(error).__name__}: {error}")
         return False
     reporter.complain(text, **details)

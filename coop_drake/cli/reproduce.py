@@ -9,14 +9,15 @@ import typer
 from rich.markup import escape
 
 import coop_drake
-from coop_drake.cli.options import Machine, Quiet, out_folder
-from coop_drake.cli.reporter import ExitCode, Reporter, reporting
+from coop_drake.cli.options import out_folder
+from coop_drake.cli.reporter import ExitCode, Reporter
 from coop_drake.errors import CoopDrakeError
 
 EXAMPLES = (("reproduce", "the paper's tables and figures beside ours, into out/reproduction/index.html"),)
 
 
 def reproduce_command(
+    reporter: Reporter,
     scenario: Annotated[
         Path | None,
         typer.Argument(
@@ -24,15 +25,8 @@ def reproduce_command(
         ),
     ] = None,
     out: Annotated[Path, out_folder("Where the report goes.")] = Path("out/reproduction"),
-    machine: Machine = False,
-    quiet: Quiet = False,
 ) -> None:
     """Run the paper's example, draw what its Tables 1-2 and Figures 3-13 show, compare with its numbers."""
-    with reporting(machine=machine, quiet=quiet) as reporter:
-        reporter.code = _reproduce(scenario, out, reporter)
-
-
-def _reproduce(scenario: Path | None, out: Path, reporter: Reporter) -> ExitCode:
     _check_clone()
     # Here and not above: no other command should wait for Drake, and only a clone has the package `paper`.
     from coop_drake.cli.task import map_cache
@@ -58,7 +52,7 @@ def _reproduce(scenario: Path | None, out: Path, reporter: Reporter) -> ExitCode
     violations = [gains.violation for gains in material.played] + [run.log.violation for run in material.runs]
     for violation in filter(None, violations):
         reporter.complain(violation)
-    return ExitCode.FAILED_RUN if any(violations) else ExitCode.DONE
+        reporter.code = ExitCode.FAILED_RUN
 
 
 def _check_clone() -> None:

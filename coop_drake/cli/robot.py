@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.markup import escape
 
-from coop_drake.cli.options import Machine, Quiet, out_folder
-from coop_drake.cli.reporter import ExitCode, Reporter, reporting
+from coop_drake.cli.options import out_folder
+from coop_drake.cli.reporter import Reporter
 
 if TYPE_CHECKING:
     from coop_drake.plant.importing import SurveyedJoint
@@ -27,6 +27,7 @@ EXAMPLES = (
 
 
 def robot_command(
+    reporter: Reporter,
     model: Annotated[Path, typer.Argument(metavar="MODEL", help="A *.urdf or *.sdf file; run xacro before.")],
     out: Annotated[Path, out_folder("A folder for model and meshes.")],
     package: Annotated[
@@ -48,43 +49,10 @@ def robot_command(
         ),
     ] = None,
     force: Annotated[bool, typer.Option("--force", help="Replace a model that is there already.")] = False,
-    machine: Machine = False,
-    quiet: Quiet = False,
 ) -> None:
     """Prepare a robot model that others wrote: meshes become hulls, all files go into one folder."""
     packages = {name: Path(folder) for name, folder in _pairs(package, "--package")}
     values = {name: _number(value) for name, value in _pairs(fix, "--fix")}
-    with reporting(machine=machine, quiet=quiet) as reporter:
-        reporter.code = _import(model, out, packages, values, gripper, reporter, force=force)
-
-
-def _pairs(words: list[str] | None, option: str) -> list[tuple[str, str]]:
-    pairs = []
-    for word in words or []:
-        name, equals, value = word.partition("=")
-        if not (name and equals and value):
-            raise typer.BadParameter(f"{option} {word} is not of the form NAME=VALUE.")
-        pairs.append((name, value))
-    return pairs
-
-
-def _number(text: str) -> float:
-    try:
-        return float(text)
-    except ValueError:
-        raise typer.BadParameter(f"--fix: {text} is no number.") from None
-
-
-def _import(
-    model: Path,
-    out: Path,
-    packages: dict[str, Path],
-    values: dict[str, float],
-    gripper: str | None,
-    reporter: Reporter,
-    *,
-    force: bool,
-) -> ExitCode:
     from coop_drake.errors import ScenarioError
     from coop_drake.files import write_atomically
     from coop_drake.plant.importing import (
@@ -122,7 +90,23 @@ def _import(
     )
     if frame != GRIPPER:
         reporter.say(f"LINK: a link or frame of the model; --gripper LINK adds a frame {GRIPPER} there")
-    return ExitCode.DONE
+
+
+def _pairs(words: list[str] | None, option: str) -> list[tuple[str, str]]:
+    pairs = []
+    for word in words or []:
+        name, equals, value = word.partition("=")
+        if not (name and equals and value):
+            raise typer.BadParameter(f"{option} {word} is not of the form NAME=VALUE.")
+        pairs.append((name, value))
+    return pairs
+
+
+def _number(text: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        raise typer.BadParameter(f"--fix: {text} is no number.") from None
 
 
 def _words(joint: SurveyedJoint) -> str:

@@ -13,27 +13,16 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import typer
 from rich.markup import escape
 
-from coop_drake.apart import REJOIN, RESTARTS
 from coop_drake.cli.options import (
-    Apart,
+    ApartOptions,
     Effort,
-    FaultsFile,
-    FreeRunning,
-    FreshMaps,
     GainsName,
-    Live,
-    Machine,
-    NoFigures,
-    Quiet,
-    Rejoin,
-    Restarts,
     ResultsFolder,
+    RunOptions,
     ScenarioPath,
-    Verbose,
-    Wait,
 )
 from coop_drake.cli.plan import plan_of
-from coop_drake.cli.reporter import ExitCode, Reporter, reporting
+from coop_drake.cli.reporter import ExitCode, Reporter
 from coop_drake.cli.results import ResultFolder
 from coop_drake.cli.summary import (
     beyond_budget,
@@ -70,78 +59,46 @@ EXAMPLES = (
 
 
 def run_command(
+    reporter: Reporter,
     scenario: ScenarioPath,
     out: ResultsFolder = None,
     gains: GainsName = None,
     effort: Effort = None,
-    fresh_maps: FreshMaps = False,
-    live: Live = False,
-    wait: Wait = False,
-    no_figures: NoFigures = False,
-    apart: Apart = False,
-    restarts: Restarts = RESTARTS,
-    rejoin: Rejoin = REJOIN,
-    faults: FaultsFile = None,
-    free_running: FreeRunning = False,
-    machine: Machine = False,
-    quiet: Quiet = False,
-    verbose: Verbose = False,
+    *,
+    options: RunOptions,
+    apart: ApartOptions,
 ) -> None:
     """Plan, map, simulate and record a transport."""
-    with reporting(machine=machine, quiet=quiet, verbose=verbose) as reporter:
-        task = read_task(scenario, gains, reporter)
-        simulation = simulation_of(
-            task,
-            reporter,
-            apart=apart,
-            restarts=restarts,
-            rejoin=rejoin,
-            faults=faults,
-            free_running=free_running,
-        )
-        folder = ResultFolder.of(task.name, out, "plan", "simulation")
-        with DrawingProcesses(figures=not no_figures) as drawing:
-            plan = plan_of(task, folder, reporter, effort=effort, simulated=True)
-            if plan:
-                with live_page(task, plan, reporter, live=live, wait=wait) as page:
-                    reporter.code = carry_out(
-                        task, plan, folder, reporter, drawing, page, simulation, fresh_maps=fresh_maps
-                    )
+    task = read_task(scenario, gains, reporter)
+    simulation = simulation_of(task, reporter, apart)
+    folder = ResultFolder.of(task.name, out, "plan", "simulation")
+    with DrawingProcesses(figures=not options.no_figures) as drawing:
+        if plan := plan_of(task, folder, reporter, effort=effort, simulated=True):
+            reporter.code = carry_out(task, plan, folder, reporter, drawing, simulation, options)
 
 
-def simulation_of(
-    task: Task,
-    reporter: Reporter,
-    *,
-    apart: bool = False,
-    restarts: int = 0,
-    rejoin: float = 0.0,
-    faults: Path | None = None,
-    free_running: bool = False,
-) -> Simulation:
+def simulation_of(task: Task, reporter: Reporter, options: ApartOptions) -> Simulation:
     """Return what simulates: all in one process, or every robot in a process of its own.
 
     Raises:
         ScenarioError: Robots in processes of their own do not compute at common samples.
     """
-    if free_running and not apart:
+    if options.free_running and not options.apart:
         raise typer.BadParameter("--free-running needs --apart: it paces processes of their own.")
-    if faults and not apart:
+    if options.faults and not options.apart:
         raise typer.BadParameter("--faults needs --apart: they are those of messages between processes.")
-    if not apart:
+    if not options.apart:
         return _in_one_process
     from coop_drake.apart import simulate_in_processes, wall_clock
     from coop_drake.diagram import control_period
 
     control_period(task.scenario)
-    wrong = faults_of(task, faults)
-    pacing = wall_clock(task.scenario) if free_running else None
     return partial(
         simulate_in_processes,
-        restarts=restarts,
-        rejoin=rejoin,
-        faults=wrong,
-        pacing=pacing,
+        restarts=options.restarts,
+        rejoin=options.rejoin,
+        faults=faults_of(task, options.faults),
+        pacing=wall_clock(task.scenario) if options.free_running else None,
         report=reporter.facts.update,
         tell=reporter.say,
     )
@@ -159,21 +116,40 @@ def carry_out(
     folder: ResultFolder,
     reporter: Reporter,
     drawing: DrawingProcesses,
-    page: LivePage | None,
     simulation: Simulation,
-    *,
-    fresh_maps: bool,
+    options: RunOptions,
 ) -> ExitCode:
     """Simulate a plan and record it; a violated invariant or a goal not reached is a failed run.
 
-    Log, accuracies of maps, recording and figures go to the folder; a live ``page`` shows the run, then
-    the recording.
+    Log, accuracies of maps, recording and figures go to the folder; the page of a live view shows the run,
+    then the recording.
     """
-    drawing.begin(task.scenario, task.problem, plan)
-    maps = map_cells(task, plan, reporter, fresh=fresh_maps)
-    log = _simulate(task, plan, maps, reporter, simulation, page)
-    if page:
-        page.show_verdict(log)
+    with _live_page(task, plan, reporter, options) as page:
+        drawing.begin(task.scenario, task.problem, plan)
+        maps = map_cells(task, plan, reporter, fresh=options.fresh_maps)
+        log = _simulate(task, plan, maps, reporter, simulation, page)
+        if page:
+            page.show_verdict(log)
+        _record(task, maps, log, folder, reporter, drawing, page)
+    if log.violation:
+        reporter.complain(log.violation)
+    elif not log.reached:
+        reporter.complain(f"the goal was not reached within {log.times[-1]:.1f} s of simulated time")
+    if exceeded := beyond_budget(reporter.facts):
+        reporter.complain(exceeded)
+    return ExitCode.DONE if reporter.facts["outcome"] == "arrived" else ExitCode.FAILED_RUN
+
+
+def _record(
+    task: Task,
+    maps: tuple[HarmonicMap, ...],
+    log: SimulationLog,
+    folder: ResultFolder,
+    reporter: Reporter,
+    drawing: DrawingProcesses,
+    page: LivePage | None,
+) -> None:
+    """Write log, accuracies, recording and figures of a run, and show its closing table."""
     folder.begin("simulation", robots=log.robot_names)
     drawing.draw(log, folder.path)
     write_accuracies(task, maps, folder)
@@ -190,13 +166,6 @@ def carry_out(
     with reporter.stage("figures", "drawing"):
         drawing.wait("figures")
     reporter.say(f"All results are in {escape(str(folder.path))}")
-    if log.violation:
-        reporter.complain(log.violation)
-    elif not log.reached:
-        reporter.complain(f"the goal was not reached within {log.times[-1]:.1f} s of simulated time")
-    if exceeded := beyond_budget(reporter.facts):
-        reporter.complain(exceeded)
-    return ExitCode.DONE if reporter.facts["outcome"] == "arrived" else ExitCode.FAILED_RUN
 
 
 def _warn_of_unknown_limits(reporter: Reporter) -> None:
@@ -243,14 +212,12 @@ def faults_of(task: Task, path: Path | None) -> Faults:
 
 
 @contextmanager
-def live_page(
-    task: Task, plan: Plan, reporter: Reporter, *, live: bool, wait: bool
-) -> Iterator[LivePage | None]:
+def _live_page(task: Task, plan: Plan, reporter: Reporter, options: RunOptions) -> Iterator[LivePage | None]:
     """Serve the page of a live view within a ``with`` block, from when a browser shows it; None if not asked.
 
-    On a terminal the run waits half a minute for a browser, with ``wait`` everywhere until there is one.
+    On a terminal the run waits half a minute for a browser, with ``--wait`` everywhere until there is one.
     """
-    if not (live or wait):
+    if not (options.live or options.wait):
         yield None
         return
     from coop_drake.viz import LivePage
@@ -259,7 +226,7 @@ def live_page(
     with LivePage(task.scenario, plan, silent_meshcat(), facts=lambda: reporter.facts) as page:
         reporter.facts["live_url"] = page.url
         reporter.say(f"[bold]Live view: open {page.url} in a browser[/]")
-        if wait or sys.stdout.isatty():
+        if options.wait or sys.stdout.isatty():
             with reporter.stage("waiting for a browser"):
-                page.wait_for_viewer(inf if wait else _WAIT_FOR_VIEWER)
+                page.wait_for_viewer(inf if options.wait else _WAIT_FOR_VIEWER)
         yield page

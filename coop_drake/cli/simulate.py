@@ -8,26 +8,10 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.markup import escape
 
-from coop_drake.apart import REJOIN, RESTARTS
-from coop_drake.cli.options import (
-    Apart,
-    FaultsFile,
-    FreeRunning,
-    FreshMaps,
-    Live,
-    Machine,
-    NoFigures,
-    Quiet,
-    Rejoin,
-    Restarts,
-    ResultsFolder,
-    ScenarioPath,
-    Verbose,
-    Wait,
-)
-from coop_drake.cli.reporter import Reporter, reporting
+from coop_drake.cli.options import ApartOptions, ResultsFolder, RunOptions, ScenarioPath
+from coop_drake.cli.reporter import Reporter
 from coop_drake.cli.results import ResultFolder
-from coop_drake.cli.run import carry_out, live_page, simulation_of
+from coop_drake.cli.run import carry_out, simulation_of
 from coop_drake.cli.summary import plan_facts
 from coop_drake.cli.task import Task, read_task
 from coop_drake.errors import RefusalError
@@ -43,6 +27,7 @@ EXAMPLES = (
 
 
 def simulate_command(
+    reporter: Reporter,
     scenario: ScenarioPath,
     plan: Annotated[
         Path | None,
@@ -55,40 +40,17 @@ def simulate_command(
         str | None,
         typer.Option("--gains", metavar="NAME|FILE", help="Gain set or its file; the plan's own by default."),
     ] = None,
-    fresh_maps: FreshMaps = False,
-    live: Live = False,
-    wait: Wait = False,
-    no_figures: NoFigures = False,
-    apart: Apart = False,
-    restarts: Restarts = RESTARTS,
-    rejoin: Rejoin = REJOIN,
-    faults: FaultsFile = None,
-    free_running: FreeRunning = False,
-    machine: Machine = False,
-    quiet: Quiet = False,
-    verbose: Verbose = False,
+    *,
+    options: RunOptions,
+    apart: ApartOptions,
 ) -> None:
     """Map, simulate and record a plan that was made before."""
-    with reporting(machine=machine, quiet=quiet, verbose=verbose) as reporter:
-        task = read_task(scenario, gains, reporter)
-        simulation = simulation_of(
-            task,
-            reporter,
-            apart=apart,
-            restarts=restarts,
-            rejoin=rejoin,
-            faults=faults,
-            free_running=free_running,
-        )
-        folder = ResultFolder.of(task.name, out, "simulation")
-        found = read_plan(task, plan or folder.plan, reporter, new_gains=gains is not None)
-        with (
-            DrawingProcesses(figures=not no_figures) as drawing,
-            live_page(task, found, reporter, live=live, wait=wait) as page,
-        ):
-            reporter.code = carry_out(
-                task, found, folder, reporter, drawing, page, simulation, fresh_maps=fresh_maps
-            )
+    task = read_task(scenario, gains, reporter)
+    simulation = simulation_of(task, reporter, apart)
+    folder = ResultFolder.of(task.name, out, "simulation")
+    found = read_plan(task, plan or folder.plan, reporter, new_gains=gains is not None)
+    with DrawingProcesses(figures=not options.no_figures) as drawing:
+        reporter.code = carry_out(task, found, folder, reporter, drawing, simulation, options)
 
 
 def read_plan(task: Task, path: Path, reporter: Reporter, *, new_gains: bool = False) -> Plan:

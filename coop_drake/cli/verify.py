@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.markup import escape
 
-from coop_drake.cli.options import Machine, Quiet, ScenarioPath
-from coop_drake.cli.reporter import ExitCode, Reporter, reporting
-from coop_drake.cli.task import Task, read_task
+from coop_drake.cli.options import ScenarioPath
+from coop_drake.cli.reporter import ExitCode, Reporter
+from coop_drake.cli.task import read_task
 from coop_drake.errors import RefusalError
 
 if TYPE_CHECKING:
@@ -25,6 +25,7 @@ EXAMPLES = (
 
 
 def verify_command(
+    reporter: Reporter,
     certificate: Annotated[
         Path,
         typer.Argument(
@@ -51,22 +52,13 @@ def verify_command(
             help="Write the scenario's question here, for `python -m coop_drake.checking QUESTION FILE`."
         ),
     ] = None,
-    machine: Machine = False,
-    quiet: Quiet = False,
 ) -> None:
     """Check a plan, a proof that there is none, or a run by its log, by code of its own."""
-    with reporting(machine=machine, quiet=quiet) as reporter:
-        task = read_task(scenario, reporter=reporter)
-        if question is not None:
-            from coop_drake.verification.question import save_question
+    task = read_task(scenario, reporter=reporter)
+    if question is not None:
+        from coop_drake.verification.question import save_question
 
-            save_question(task.problem, question)
-        reporter.code = _verify(certificate, plan, task, reporter, braked=braked)
-
-
-def _verify(
-    certificate: Path, plan: Path | None, task: Task, reporter: Reporter, *, braked: bool
-) -> ExitCode:
+        save_question(task.problem, question)
     if braked and certificate.suffix != ".npz":
         raise typer.BadParameter("--braked is about the log of a run, log.npz.")
     begun = process_time()
@@ -93,7 +85,8 @@ def _verify(
     except RefusalError as error:
         reporter.facts["valid"] = False
         reporter.complain(f"{certificate}: {error}", where=error.where, finding=error.finding)
-        return ExitCode.FAILED_RUN
+        reporter.code = ExitCode.FAILED_RUN
+        return
     reporter.facts.update(
         valid=True,
         verifying_cpu_seconds=round(process_time() - begun, 4),
@@ -112,8 +105,8 @@ def _verify(
         reporter.facts["trusted"] = list(TRUSTED)
         reporter.say(escape("To be trusted: " + "; ".join(TRUSTED)))
     reporter.say(escape(f"Proved: {verified.proved}. Not proved: {verified.not_proved}"))
-    # A way is no answer to the question: another one may keep the limits.
-    return ExitCode.BEYOND_LIMITS if verified.answer == "beyond limits" else ExitCode.DONE
+    if verified.answer == "beyond limits":  # No answer to the question: another way may keep the limits.
+        reporter.code = ExitCode.BEYOND_LIMITS
 
 
 def _row(check: Check) -> tuple[str, str, str]:

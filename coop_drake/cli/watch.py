@@ -9,15 +9,15 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 from rich.markup import escape
 
-from coop_drake.cli.options import Machine, Quiet, ScenarioPath
+from coop_drake.cli.options import ScenarioPath
 from coop_drake.cli.plan import plan_of
-from coop_drake.cli.reporter import ExitCode, Reporter, reporting
+from coop_drake.cli.reporter import ExitCode, Reporter
 from coop_drake.cli.results import ResultFolder
 from coop_drake.cli.summary import summary_rows
-from coop_drake.cli.task import Task, read_task
+from coop_drake.cli.task import read_task
 
 if TYPE_CHECKING:
-    from coop_drake.answers import PlanningProblem
+    pass
 
 _FEWEST, _MOST = 2, 500
 """Numbers of keyframes that make a moving picture and still fit into a page that browsers open [-]."""
@@ -32,8 +32,9 @@ def _checked_margin(value: float | None) -> float | None:
 
 
 def watch_command(
+    reporter: Reporter,
     scenario: ScenarioPath,
-    output: Annotated[
+    out: Annotated[
         Path | None,
         typer.Option(
             "--output",
@@ -70,41 +71,16 @@ def watch_command(
             help="Metres to keep from walls. Only with 0, the default of cells, is 'no path' a proof.",
         ),
     ] = None,
-    machine: Machine = False,
-    quiet: Quiet = False,
 ) -> None:
     """Watch the planner search: pictures, a moving picture and a page to turn in space."""
-    with reporting(machine=machine, quiet=quiet) as reporter:
-        task = read_task(scenario, reporter=reporter)
-        folder = ResultFolder.of(task.name, output, "search", below="think")
-        reporter.code = _watch(task.problem, folder, frames, strategy, margin, reporter)
-        if reporter.code is ExitCode.DONE:
-            _show_plan(task, strategy, reporter)
-
-
-def _show_plan(task: Task, strategy: str, reporter: Reporter) -> None:
-    """Show the rows that `plan` shows; a search that was watched alone has other cells."""
-    if strategy != "portfolio":
-        reporter.say("These cells are of this search alone; the plan is made of others: --strategy portfolio")
-    elif plan_of(task, None, reporter):
-        reporter.table(task.name, summary_rows(reporter.facts))
-
-
-def _watch(
-    problem: PlanningProblem,
-    folder: ResultFolder,
-    frames: int,
-    strategy: Literal["cells", "paper", "portfolio"],
-    margin: float | None,
-    reporter: Reporter,
-) -> ExitCode:
-    """Record, then draw."""
     from coop_drake import watching
 
+    task = read_task(scenario, reporter=reporter)
+    folder = ResultFolder.of(task.name, out, "search", below="think")
     if margin is None:
-        margin = problem.settings.margin if strategy == "portfolio" else 0.0
+        margin = task.problem.settings.margin if strategy == "portfolio" else 0.0
     with reporter.stage("searching") as progress:
-        recording = watching.record_search(problem, strategy, margin, progress)
+        recording = watching.record_search(task.problem, strategy, margin, progress)
         shown = watching.keyframes(recording, frames)
     reporter.facts.update(
         answer=recording.verdict.value,
@@ -120,6 +96,12 @@ def _watch(
     reporter.say(f"[bold]{escape(shown[-1].headline)}[/]")
     place, page = escape(str(folder.path)), escape(str(written[-1]))
     reporter.say(f"{len(shown)} pictures are in {place}; open {page} in a browser")
+    reporter.code = ExitCode.of(recording.verdict.value)
     if recording.verdict.value == "infeasible" and recording.margin > 0.0:
-        return ExitCode.UNDECIDED  # That no path keeps a margin proves nothing about the scenario itself.
-    return ExitCode.of(recording.verdict.value)
+        reporter.code = ExitCode.UNDECIDED  # That no path keeps a margin proves nothing about the scenario.
+    if reporter.code is not ExitCode.DONE:
+        return
+    if strategy != "portfolio":  # A search that was watched alone has other cells than the plan.
+        reporter.say("These cells are of this search alone; the plan is made of others: --strategy portfolio")
+    elif plan_of(task, None, reporter):
+        reporter.table(task.name, summary_rows(reporter.facts))

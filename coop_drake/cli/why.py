@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 
 from rich.markup import escape
 
-from coop_drake.cli.options import Machine, PictureFolder, Quiet, ScenarioPath
+from coop_drake.cli.options import PictureFolder, ScenarioPath
 from coop_drake.cli.plan import answer_to, report_answer
-from coop_drake.cli.reporter import ExitCode, Reporter, reporting
+from coop_drake.cli.reporter import ExitCode, Reporter
 from coop_drake.cli.results import ResultFolder
 from coop_drake.cli.summary import summary_rows
 from coop_drake.cli.task import Task, read_task
@@ -21,26 +21,24 @@ EXAMPLES = (("why models/closed.scenario.yaml", "what blocks, and what would hel
 
 
 def why_command(
+    reporter: Reporter,
     scenario: ScenarioPath,
     out: PictureFolder = None,
-    machine: Machine = False,
-    quiet: Quiet = False,
 ) -> None:
     """Say why there is no plan: what blocks, where, how much is missing, and what would help."""
-    with reporting(machine=machine, quiet=quiet) as reporter:
-        from coop_drake.diagnosis import Answer, diagnose, facts_of
+    from coop_drake.diagnosis import Answer, diagnose, facts_of
 
-        task = read_task(scenario, reporter=reporter)
-        folder, before = ResultFolder.of(task.name, out, "diagnosis"), process_time()
-        with reporter.stage("diagnosing") as progress:
-            diagnosis = diagnose(task.problem, progress)
-        reporter.facts.update(facts_of(diagnosis), diagnosis_cpu_seconds=round(process_time() - before, 4))
-        folder.begin("diagnosis")
-        if diagnosis.answer is Answer.FOUND:
-            _show_plan(task, folder, reporter)
-        else:
-            _show_diagnosis(diagnosis, task, folder, reporter)
-            reporter.code = ExitCode.of(diagnosis.answer.value)
+    task = read_task(scenario, reporter=reporter)
+    folder, before = ResultFolder.of(task.name, out, "diagnosis"), process_time()
+    with reporter.stage("diagnosing") as progress:
+        diagnosis = diagnose(task.problem, progress)
+    reporter.facts.update(facts_of(diagnosis), diagnosis_cpu_seconds=round(process_time() - before, 4))
+    folder.begin("diagnosis")
+    if diagnosis.answer is Answer.FOUND:
+        _show_plan(task, folder, reporter)
+    else:
+        _show_diagnosis(diagnosis, task, folder, reporter)
+        reporter.code = ExitCode.of(diagnosis.answer.value)
 
 
 def _show_plan(task: Task, folder: ResultFolder, reporter: Reporter) -> None:

@@ -7,7 +7,7 @@ from typing import Any, TypeVar
 
 import yaml
 
-from coop_drake.errors import ScenarioError
+from coop_drake.errors import Finding, ScenarioError
 from coop_drake.files import check_readable
 from coop_drake.typed_data import DataError, convert_class
 
@@ -74,10 +74,10 @@ def parse(text: str) -> object:
         raise
     except yaml.MarkedYAMLError as error:
         place = _place(error.problem_mark) if error.problem_mark else "the file"
-        raise DataError(place, error.problem or "unreadable text", "valid YAML") from error
+        raise DataError(place, Finding(error.problem or "unreadable text"), "valid YAML") from error
     except (yaml.YAMLError, AttributeError, TypeError, ValueError) as error:
         # PyYAML also lets through what int(), float() and date() raise.
-        raise DataError("the file", " ".join(str(error).split()), "valid YAML") from error
+        raise DataError("the file", Finding(" ".join(str(error).split())), "valid YAML") from error
     if isinstance(data, dict):
         return {key: value for key, value in data.items() if not str(key).startswith("_")}
     return data
@@ -94,7 +94,7 @@ def read_file(cls: type[T], path: Path) -> T:
     except DataError as error:
         raise ScenarioError.of(str(path), error.faults) from error
     except (OSError, UnicodeDecodeError) as error:
-        raise ScenarioError(str(path), "the file", str(error), "a readable file") from error
+        raise ScenarioError(str(path), "the file", Finding(error), "a readable file") from error
 
 
 def _place(mark: yaml.Mark) -> str:
@@ -125,7 +125,9 @@ class _Collection:
         self.size += size
         self.height = max(self.height, height + 1)
         if self.size > _LARGEST:
-            raise DataError(self.place, f"{self.size} values by repetition", f"at most {_LARGEST} values")
+            raise DataError(
+                self.place, Finding(f"{self.size} values by repetition"), f"at most {_LARGEST} values"
+            )
 
 
 def _check_events(events: Iterator[yaml.Event]) -> None:
@@ -147,10 +149,12 @@ def _check_events(events: Iterator[yaml.Event]) -> None:
         elif isinstance(event, yaml.AliasEvent) and event.anchor in anchors:
             repeated = anchors[event.anchor]
             if not repeated.closed:
-                raise DataError(repeated.place, "a circular reference", "data that does not contain itself")
+                raise DataError(
+                    repeated.place, Finding("a circular reference"), "data that does not contain itself"
+                )
             size, height = repeated.size, repeated.height
         if len(around) + height > _DEEPEST:
             allowed = f"at most {_DEEPEST} lists and mappings inside one another"
-            raise DataError(_place(event.start_mark), "too deep nesting", allowed)
+            raise DataError(_place(event.start_mark), Finding("too deep nesting"), allowed)
         if around and not isinstance(event, yaml.CollectionStartEvent):
             around[-1].add(event, size, height)

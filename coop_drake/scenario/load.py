@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 from pathlib import Path
 
-from coop_drake.errors import ScenarioError
+from coop_drake.errors import Finding, ScenarioError
 from coop_drake.geometry.polygons import corners_of
 from coop_drake.laws.gains import GainSet
 from coop_drake.scenario.document import read_file, write
@@ -47,11 +47,11 @@ def read_scenario(path: Path | str) -> Scenario:
     file = scenario_file(path)
     if file.is_dir():
         files = "a file, or a folder with just one *.scenario.yaml"
-        raise ScenarioError(str(path), "the file", "a folder", files)
+        raise ScenarioError(str(path), "the file", Finding("a folder"), files)
     if not file.exists():
         known = ", ".join(shipped_scenarios())
         raise ScenarioError(
-            str(path), "the file", "no such file", f"a readable file, or a shipped scenario: {known}"
+            str(path), "the file", Finding("no such file"), f"a readable file, or a shipped scenario: {known}"
         )
     return with_floor(dataclasses.replace(read_file(Scenario, file), path=file))
 
