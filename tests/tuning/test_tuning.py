@@ -17,7 +17,6 @@ import pytest
 from typer.testing import CliRunner
 
 from coop_drake.cli import app
-from coop_drake.cli.gain_search import Workers
 from coop_drake.errors import TuningError
 from coop_drake.laws import FixedGains, ScheduledGains
 from coop_drake.scenario import Control, Deployment, load_scenario, with_gains
@@ -28,6 +27,7 @@ from coop_drake.tuning import (
     Objective,
     TrialOutcome,
     TrialRunner,
+    Workers,
     read_weights,
     search,
     tunable_parameters,
