@@ -203,25 +203,15 @@ def test_the_same_seed_gives_the_same_run_and_another_seed_another_one():
         ("control.predictor", {"control": Control(predictor=True)}),
         ("control.observer", {"control": Control(observer=True)}),
         ("control.hold", {"control": Control(hold=Hold())}),
+        ("deployment.control_rate", {"deployment": Deployment()}),
+        ("deployment.robots.robot_0.sample_offset", {"deployment": of_one(sample_offset=0.001)}),
     ],
 )
-def test_scenarios_that_the_loop_does_not_know_are_refused(key, change):
+def test_what_the_loop_does_not_know_is_refused(key, change):
     scenario, plan = small_problem()
+    asked = replace(scenario, **{"deployment": at_200_hz(), **change})
     with pytest.raises(ScenarioError) as refusal:
-        prepare(replace(scenario, deployment=at_200_hz(), **change), plan, small_maps())
-    assert key in str(refusal.value)
-
-
-@pytest.mark.parametrize(
-    ("key", "deployment"),
-    [
-        ("deployment.control_rate", Deployment()),
-        ("deployment.robots.robot_0.sample_offset", of_one(sample_offset=0.001)),
-    ],
-)
-def test_departures_that_the_loop_does_not_know_are_refused(key, deployment):
-    with pytest.raises(ScenarioError) as refusal:
-        run(prepared(), deployment)
+        run(prepare(asked, plan, small_maps()))
     assert key in str(refusal.value)
 
 

@@ -68,14 +68,13 @@ def area(mesh):
     return 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1).sum()
 
 
-def test_a_flat_mesh_has_the_polygons_area_and_height():
-    mesh = solids.flat_mesh([FLOOR], 0.3)
-    assert area(mesh) == pytest.approx(FLOOR.area)
-    assert set(mesh.vertices[:, 2]) == {0.3}
-
-
-def test_a_wall_has_its_top_and_all_its_sides():
-    assert area(solids.slab_mesh([FLOOR], 0.0, 0.5)) == pytest.approx(FLOOR.area + 0.5 * FLOOR.length)
+def test_meshes_have_the_areas_of_their_polygons_and_stand_between_their_heights():
+    flat, slab = solids.flat_mesh([FLOOR], 0.3), solids.slab_mesh([FLOOR], 0.2, 0.3)
+    assert area(flat) == pytest.approx(FLOOR.area)
+    assert set(flat.vertices[:, 2]) == {0.3}
+    assert area(slab) == pytest.approx(FLOOR.area + 0.1 * FLOOR.length)  # the top and all sides
+    assert (slab.vertices[:, 2].min(), slab.vertices[:, 2].max()) == (0.2, 0.3)
+    assert area(solids.joined([flat, slab])) == pytest.approx(2.0 * FLOOR.area + 0.1 * FLOOR.length)
 
 
 def test_walls_stand_beside_the_floor_never_on_it():
@@ -96,12 +95,6 @@ def test_ring_lines_run_once_round_every_ring():
     assert np.linalg.norm(end - start, axis=0).sum() == pytest.approx(FLOOR.length + 4.0)
 
 
-def test_a_slab_stands_between_its_heights():
-    mesh = solids.slab_mesh([FLOOR], 0.2, 0.3)
-    assert area(mesh) == pytest.approx(FLOOR.area + 0.1 * FLOOR.length)
-    assert (mesh.vertices[:, 2].min(), mesh.vertices[:, 2].max()) == (0.2, 0.3)
-
-
 def test_a_ribbon_has_two_triangles_a_piece_in_the_order_of_the_line():
     points = np.column_stack([np.linspace(0.0, 3.0, 7), np.zeros(7)])
     mesh = solids.ribbon_mesh(points, 0.1, 0.02)
@@ -109,11 +102,6 @@ def test_a_ribbon_has_two_triangles_a_piece_in_the_order_of_the_line():
     assert area(mesh) == pytest.approx(0.3)
     middles = mesh.vertices[mesh.faces, 0].mean(axis=1).reshape(-1, 2).mean(axis=1)
     np.testing.assert_allclose(middles, points[:-1, 0] + 0.25)
-
-
-def test_joined_meshes_keep_their_areas():
-    mesh = solids.joined([solids.flat_mesh([FLOOR], 0.0), solids.slab_mesh([FLOOR], 0.2, 0.3)])
-    assert area(mesh) == pytest.approx(2.0 * FLOOR.area + 0.1 * FLOOR.length)
 
 
 def test_a_tube_has_the_surface_of_a_prism_and_stops_where_the_line_is_interrupted():

@@ -392,15 +392,7 @@ def write_team(folder, uri="<uri>tip.obj</uri>", edits=()):
     return write_edited(folder, (LONG_BLUE, "parts/arm.sdf"))
 
 
-@pytest.mark.parametrize(
-    "uri",
-    [
-        "<uri>tip.obj</uri>",
-        "<uri><![CDATA[tip.obj]]></uri>",
-        "<uri><!-- the tip -->tip.obj</uri>",
-        "<uri>tip&#46;obj</uri>",
-    ],
-)
+@pytest.mark.parametrize("uri", ["<uri>tip.obj</uri>", "<uri><!-- the tip -->tip&#46;obj</uri>"])
 def test_a_mesh_that_grows_asks_another_question_however_it_is_named(uri, tmp_path):
     path = write_team(tmp_path, uri)
     before, models = read_task(path).problem, models_digest(load_scenario(path))

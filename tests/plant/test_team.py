@@ -38,34 +38,25 @@ from tests.support.robot_models import Arm
 from tests.support.system_checks import evaluate
 
 
-def test_grasps_are_where_the_object_offers_them():
-    team, _builder = team_of(shipped("three"))
-    for robot, grasp in zip(team.robots, GRASPS, strict=False):
+def test_grasps_bases_and_masses_of_shipped_teams_by_hand():
+    """Grasps are where the object offers them; straight arms put the bases in line."""
+    three, _builder = team_of(shipped("three"))
+    for robot, grasp in zip(three.robots, GRASPS, strict=False):
         assert (robot.X_LE.x, robot.X_LE.y) == pytest.approx((grasp.x, grasp.y))
         assert np.cos(robot.X_LE.angle - grasp.angle) == pytest.approx(1.0)
-
-
-def test_straight_arms_put_the_bases_in_line():
+    inertia, context = three.object_inertia, three.plant.CreateDefaultContext()
+    assert (inertia.mass, inertia.inertia_about_com) == pytest.approx((1.0, 1.0))
+    assert inertia.p_LLcm == pytest.approx([0.0, 0.0])
+    for robot in three.robots:
+        bodies = [three.plant.get_body(i) for i in three.plant.GetBodyIndices(robot.model_instance)]
+        masses = {body.name(): body.get_mass(context) for body in bodies}
+        assert masses == pytest.approx({"base": 6.0, "link_1": 1.0, "link_2": 1.0})
     team, _builder = team_of(shipped("base"))
     context = team.plant.CreateDefaultContext()
     set_configuration(team, context, np.zeros(5))
-    poses = base_poses(team, context)
-    assert poses[:, :2] == pytest.approx(np.array([[1.15, 0.0], [-1.15, 0.0]]), abs=1e-12)
-    assert abs(poses[0, 2]) == pytest.approx(np.pi)
-    assert poses[1, 2] == pytest.approx(0.0)
-
-
-def test_masses_are_those_of_the_cases():
-    team, _builder = team_of(shipped("three"))
-    context = team.plant.CreateDefaultContext()
-    assert team.object_inertia.mass == pytest.approx(1.0)
-    assert team.object_inertia.inertia_about_com == pytest.approx(1.0)
-    assert team.object_inertia.p_LLcm == pytest.approx([0.0, 0.0])
-    for robot in team.robots:
-        bodies = [team.plant.get_body(i) for i in team.plant.GetBodyIndices(robot.model_instance)]
-        assert {b.name(): b.get_mass(context) for b in bodies} == pytest.approx(
-            {"base": 6.0, "link_1": 1.0, "link_2": 1.0}
-        )
+    (x_0, y_0, yaw_0), (x_1, y_1, yaw_1) = base_poses(team, context)
+    assert (x_0, y_0, abs(yaw_0)) == pytest.approx((1.15, 0.0, np.pi), abs=1e-12)
+    assert (x_1, y_1, yaw_1) == pytest.approx((-1.15, 0.0, 0.0), abs=1e-12)
 
 
 def test_inertia_of_an_object_whose_mass_lies_off_its_frame(tmp_path):

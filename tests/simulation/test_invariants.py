@@ -76,33 +76,26 @@ def lone(*shapes):
     return ComponentTree((Component("object", None, None, (Body("object", None, shapes),)),), frozenset())
 
 
+ROOM_OF_4 = shapely.box(0, 0, 4, 4)
+SQUARE = rectangle(-0.5, 0.5, -0.5, 0.5)
+
+
 @pytest.mark.parametrize(
-    ("z", "expected"),
+    ("room", "shape", "z", "expected"),
     [
-        ((2.0, 2.0, 0.0), 1.5),
-        ((0.75, 2.0, 0.0), 0.25),
-        ((0.4, 2.0, 0.0), -0.1),
-        ((-1.0, 2.0, 0.0), -1.5),
-        ((2.0, 2.0, pi / 4), 2.0 - 0.5 * np.sqrt(2.0)),
+        (ROOM_OF_4, SQUARE, (2.0, 2.0, 0.0), 1.5),
+        (ROOM_OF_4, SQUARE, (0.75, 2.0, 0.0), 0.25),
+        (ROOM_OF_4, SQUARE, (0.4, 2.0, 0.0), -0.1),
+        (ROOM_OF_4, SQUARE, (-1.0, 2.0, 0.0), -1.5),
+        (ROOM_OF_4, SQUARE, (2.0, 2.0, pi / 4), 2.0 - 0.5 * np.sqrt(2.0)),
+        (ROOM_OF_4 - shapely.box(1.9, 1.9, 2.1, 2.1), SQUARE, (2.0, 2.0, 0.0), -0.4),  # it holds a pillar
+        (ROOM_OF_4, disc(0.25), (0.3, 2.0, 0.0), 0.05),
     ],
 )
-def test_a_square_in_a_square_room(z, expected):
-    clearance = TeamClearance(shapely.box(0, 0, 4, 4), lone(rectangle(-0.5, 0.5, -0.5, 0.5)))
-    assert clearance(np.array(z))[0].distance == pytest.approx(expected, abs=1e-12)
-
-
-def test_a_pillar_swallowed_by_a_body_is_a_collision():
-    room = shapely.box(0, 0, 4, 4) - shapely.box(1.9, 1.9, 2.1, 2.1)
-    clearance = TeamClearance(room, lone(rectangle(-0.5, 0.5, -0.5, 0.5)))
-    assert clearance(np.array([2.0, 2.0, 0.0]))[0].distance == pytest.approx(-0.4)
-
-
-def test_a_disc_is_exact_and_names_its_body():
-    clearance = TeamClearance(shapely.box(0, 0, 4, 4), lone(disc(0.25)))
-    walls, bodies = clearance(np.array([0.3, 2.0, 0.0]))
-    assert walls.distance == pytest.approx(0.05, abs=1e-15)
-    assert walls.place == "object and the walls"
-    assert bodies.distance == np.inf
+def test_clearances_of_one_body_by_hand(room, shape, z, expected):
+    walls, bodies = TeamClearance(room, lone(shape))(np.array(z))
+    assert walls.distance == pytest.approx(expected, abs=1e-12)
+    assert (walls.place, bodies.distance) == ("object and the walls", np.inf)
 
 
 def test_a_deep_overlap_of_bodies_is_negative_and_named():
@@ -170,6 +163,7 @@ def test_a_good_sample_has_positive_margins_and_no_violation(invariants):
     assert margins.funnel_margin == pytest.approx(0.1)
     assert margins.slice_margin == pytest.approx(0.2)
     assert margins.energy_margin == 0.4
+    assert invariants.check(replace(GOOD, energy_margin=0.0)).violation == ""
     assert margins.acceleration_error == 1e-12
     assert margins.wrench_error == 0.0
 
@@ -189,6 +183,7 @@ def moved(index, value):
         ({"z": moved(2, 0.32)}, "distance of object angle to its funnel is -0.02 rad or m"),
         ({"z": moved(4, 0.26)}, "distance of robot_1::joint_1 to its funnel is -0.01 rad or m"),
         ({"z": moved(3, -0.35)}, "distance of robot_0::joint_1 to its slice is -0.05 rad or m"),
+        ({"z": moved(4, 0.25)}, "distance of robot_1::joint_1 to its funnel is 0 rad or m"),
         ({"grasp_error": 2e-4}, "distance of an end effector to its grasp is 0.0002 m"),
         ({"energy_margin": -1e-3}, "Delta E is -0.001 m^2/s^2"),
         ({"acceleration_error": 2e-9}, "realised less commanded acceleration is 2e-09 m/s^2"),
@@ -202,36 +197,23 @@ def test_each_broken_invariant_is_named_with_time_cell_and_amount(invariants, ch
     assert message in violation
 
 
-def test_an_axis_on_its_funnel_is_a_violation(invariants):
-    assert "to its funnel is 0 rad" in invariants.check(replace(GOOD, z=moved(4, 0.25))).violation
-
-
-def test_no_energy_left_is_no_violation(invariants):
-    assert invariants.check(replace(GOOD, energy_margin=0.0)).violation == ""
-
-
 def logged(cells, *robots):
     """A log in which robots have these margins at steps in these cells."""
     log = synthetic_log(case("base"), samples=len(cells))
     return replace(log, cell_index=np.array(cells), ready_margins=np.array(robots, dtype=float).T)
 
 
-def test_each_robot_reports_once_a_cell_and_hears_once_of_every_new_cell():
-    statistics = communication(logged([0, 0, 1, 1], [-1, 0, -1, 1], [2, 2, -1, 3]))
-    assert statistics.reports == (2, 2)
-    assert statistics.announcements == 2
-    assert statistics.messages == 6
-
-
-def test_what_is_taken_back_is_told_too():
-    assert communication(logged([0] * 5, [-1, 1, -1, -2, 1], [-1] * 5)).reports == (3, 0)
-
-
-def test_a_robot_that_is_ready_on_entry_says_so_again():
-    assert communication(logged([0, 0, 1], [1, 1, 1], [-1, 1, -1])).reports == (2, 1)
-
-
-@pytest.mark.parametrize("margin", [1.0, -1.0])
-def test_a_run_that_never_leaves_its_first_cell(margin):
-    statistics = communication(logged([0, 0], [margin, margin], [-1.0, -1.0]))
-    assert (statistics.reports, statistics.announcements) == ((int(margin > 0), 0), 0)
+@pytest.mark.parametrize(
+    ("cells", "robots", "reports", "announcements"),
+    [
+        ([0, 0, 1, 1], [[-1, 0, -1, 1], [2, 2, -1, 3]], (2, 2), 2),
+        ([0] * 5, [[-1, 1, -1, -2, 1], [-1] * 5], (3, 0), 0),  # what is taken back is told, too
+        ([0, 0, 1], [[1, 1, 1], [-1, 1, -1]], (2, 1), 2),  # who is ready on entry says so again
+        ([0, 0], [[1.0, 1.0], [-1.0, -1.0]], (1, 0), 0),
+        ([0, 0], [[-1.0, -1.0], [-1.0, -1.0]], (0, 0), 0),
+    ],
+)
+def test_reports_are_sent_where_they_change_and_cells_are_announced(cells, robots, reports, announcements):
+    statistics = communication(logged(cells, *robots))
+    assert (statistics.reports, statistics.announcements) == (reports, announcements)
+    assert statistics.messages == sum(reports) + announcements

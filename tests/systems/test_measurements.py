@@ -40,8 +40,10 @@ def used(sensor, periods=200, offset=0.0):
     return np.array(numbers)
 
 
-def test_a_good_sensor_passes_all_on_at_once():
-    np.testing.assert_allclose(used(LossyMeasurement(1, PERIOD)), range(200), atol=1e-9)
+@pytest.mark.parametrize(("arguments", "delay"), [({}, 0), ({"late": 1.0, "late_by": 0.2}, 2)])
+def test_a_good_sensor_passes_all_on_at_once_and_all_late_is_a_delay(arguments, delay):
+    numbers = used(LossyMeasurement(1, PERIOD, **arguments))
+    np.testing.assert_allclose(numbers[delay:], range(200 - delay), atol=1e-9)
 
 
 @pytest.mark.parametrize("offset", [0.0, 0.03])
@@ -63,11 +65,6 @@ def test_late_ones_are_used_when_they_arrive_unless_a_newer_one_has(late_by):
     for period in range(10, 200):
         arrived = [n for n in range(period + 1) if n in on_time or n + periods <= period]
         assert numbers[period] == pytest.approx(max(arrived))
-
-
-def test_all_late_is_a_delay():
-    numbers = used(LossyMeasurement(1, PERIOD, late=1.0, late_by=0.2))
-    np.testing.assert_allclose(numbers[2:], range(198), atol=1e-9)
 
 
 def test_nothing_new_arrives_when_all_is_lost_and_its_state_at_rest_is_used():

@@ -31,39 +31,37 @@ from tests.support.figure_names import OF_EVERY_RUN, OF_TWO_ROBOTS
 from tests.support.sliding import with_sliding_joint
 from tests.support.synthetic_log import synthetic_log, synthetic_plan
 
-ROBOTS = {"elbow": OF_TWO_ROBOTS, "three": (*OF_TWO_ROBOTS, "fig11_joints_robot_2")}
 
-
-def draw(name, folder):
+def run_of(name):
+    """Floor, tree, plan and log of a run."""
     problem = case(name)
-    plan, log = synthetic_plan(problem), synthetic_log(problem)
-    return write_figures(problem.workspace, problem.tree, plan, log, folder)
+    return problem.workspace, problem.tree, synthetic_plan(problem), synthetic_log(problem)
 
 
-@pytest.fixture(scope="module")
-def drawn(tmp_path_factory):
-    """The figures of a run of every team, and their folder."""
-    folders = {name: tmp_path_factory.mktemp(name) for name in ROBOTS}
-    return {name: (folder, draw(name, folder)) for name, folder in folders.items()}
-
-
-@pytest.mark.parametrize("name", ROBOTS)
-def test_a_run_gets_figures_4_to_13_and_a_summary_as_png(drawn, name):
-    folder, written = drawn[name]
-    stems = OF_EVERY_RUN + ROBOTS[name]
-    assert sorted(path.name for path in written) == sorted(f"{stem}.png" for stem in stems)
-    assert sorted(folder.iterdir()) == sorted(written)
+def test_a_run_gets_figures_4_to_13_and_a_summary_as_png(tmp_path):
+    written = write_figures(*run_of("three"), tmp_path)
+    expected = OF_EVERY_RUN + OF_TWO_ROBOTS + ("fig11_joints_robot_2",)
+    assert sorted(path.stem for path in written) == sorted(expected)
+    assert sorted(tmp_path.iterdir()) == sorted(written)
     for path in written:
         with Image.open(path) as image:
+            assert image.format == "PNG"
             grey = np.asarray(image.convert("L"))
         assert min(grey.shape) > 300
         assert np.ptp(grey) > 100
 
 
-def test_the_same_run_gives_the_same_picture(drawn, tmp_path):
-    _, written = drawn["elbow"]
-    again = draw("elbow", tmp_path)
-    assert [path.read_bytes() for path in again] == [path.read_bytes() for path in written]
+def test_the_same_run_gives_the_same_pictures_and_a_process_writes_only_those_that_it_is_given(tmp_path):
+    *known, log = run_of("elbow")
+    written = []
+    for folder in ("one", "other"):
+        figures = RunFigures(*known)
+        names = figures.names(log)
+        assert sorted(names) == sorted(OF_EVERY_RUN + OF_TWO_ROBOTS)
+        paths = figures.write(log, tmp_path / folder, numbers=iter([5, 2]))
+        assert [path.stem for path in paths] == [names[5], names[2]]
+        written.append([path.read_bytes() for path in paths])
+    assert written[0] == written[1]
 
 
 def test_axes_made_ahead_give_the_same_pictures():
@@ -72,17 +70,6 @@ def test_axes_made_ahead_give_the_same_pictures():
         ahead = TimeAxes([2, 3, 2])
         for draw in (position_figure, angle_figure, summary_figure, position_figure):
             assert picture_of(draw(log, ahead)) == picture_of(draw(log))
-
-
-def test_a_process_writes_only_the_figures_that_it_is_given(tmp_path):
-    problem = case("elbow")
-    figures, log = (
-        RunFigures(problem.workspace, problem.tree, synthetic_plan(problem)),
-        synthetic_log(problem),
-    )
-    names = figures.names(log)
-    written = figures.write(log, tmp_path, numbers=iter([5, 2]))
-    assert [path.stem for path in written] == [names[5], names[2]]
 
 
 def test_figure_4_labels_start_and_goal_on_equal_axes_in_metres():
@@ -95,7 +82,7 @@ def test_figure_4_labels_start_and_goal_on_equal_axes_in_metres():
     assert labels["goal"] == pytest.approx((5.0, 8.0))
 
 
-def test_figure_5_draws_the_path_that_was_logged():
+def test_figure_5_draws_the_path_that_was_logged_and_every_robot_in_its_colour_and_says_when():
     problem = case("base")
     log = synthetic_log(problem)
     figure = path_figure(problem.workspace, problem.tree, log)
@@ -103,12 +90,6 @@ def test_figure_5_draws_the_path_that_was_logged():
     np.testing.assert_array_equal(axes.lines[0].get_xydata(), log.object_pose[:, :2])
     assert axes.lines[0].get_color() == INK
     assert "(black line)" in figure.texts[0].get_text()
-
-
-def test_figure_5_shows_every_robot_in_its_colour_and_says_when():
-    problem = case("base")
-    log = synthetic_log(problem)
-    (axes,) = path_figure(problem.workspace, problem.tree, log).axes
     first, *_, last = [one for one in axes.collections if isinstance(one, PathCollection)]
     shown = {to_hex(colour).lower() for colour in last.get_edgecolors()}
     assert shown == {colour.lower() for colour in (OBJECT, robot_colour(0), robot_colour(1))}
@@ -147,18 +128,12 @@ def test_figure_7_shows_the_angle_its_funnel_and_a_dashed_line_at_every_switch()
     assert [segment[:, 0].tolist() for segment in dashed.get_segments()] == [[t, t] for t in switches]
 
 
-def test_every_joint_of_a_robot_has_its_own_axes():
+@pytest.mark.parametrize(("changed", "unit"), [(lambda tree: tree, "rad"), (with_sliding_joint, "m")])
+def test_every_joint_of_a_robot_has_its_own_axes_in_its_unit(changed, unit):
     problem = case("elbow")
-    figure = joints_figure(problem.tree, synthetic_log(problem), 1)
+    figure = joints_figure(changed(problem.tree), synthetic_log(problem), 1)
     assert figure is not None
-    assert [axes.get_ylabel() for axes in figure.axes] == ["joint_1 [rad]", "joint_2 [rad]"]
-
-
-def test_a_sliding_joint_is_labelled_in_metres():
-    problem = case("elbow")
-    figure = joints_figure(with_sliding_joint(problem.tree), synthetic_log(problem), 1)
-    assert figure is not None
-    assert [axes.get_ylabel() for axes in figure.axes] == ["joint_1 [rad]", "joint_2 [m]"]
+    assert [axes.get_ylabel() for axes in figure.axes] == ["joint_1 [rad]", f"joint_2 [{unit}]"]
 
 
 def test_a_jump_at_a_switch_is_broken_not_sloped():
