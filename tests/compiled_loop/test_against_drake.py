@@ -75,7 +75,7 @@ CASES = {
     "silence": of_one(silence=Silence(0.5, 0.02, motors="limp")),
     "silence from the start": of_one(silence=Silence(0.0, 1.2)),
     "blocked wheels": of_one(blocked=BlockedWheels(0.5, 0.02)),
-    "wheels that slip": of_one(slip=WheelSlip(0.5, 0.5, 0.2)),
+    "wheels that slip": of_one(slip=WheelSlip(0.5, 0.3, 0.2)),
     "held motors": of_one(silence=Silence(0.5, 0.02, motors="held")),
     "floor": at_200_hz(floor=Floor(coulomb_friction=5.0, viscous_friction=5.0, slope=0.01)),
     "dry friction of joints": at_200_hz(joint_friction=JointFriction(coulomb=0.3)),

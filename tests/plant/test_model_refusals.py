@@ -84,6 +84,10 @@ BROKEN = [
         "which does not exist",
     ),
     (exchanged(ARM, ("<mass>6.0", "<mass>nan")), "'nan' in <mass> is no finite number"),
+    (
+        jointed("revolute", more="<limit><lower>nan</lower><upper>1</upper></limit>"),
+        "'nan' in <lower> is no finite number",
+    ),
     (exchanged(ARM, ("<radius>0.2", "<radius>inf")), "'inf' in <radius> is no finite number"),
     (Arm(extra="<static>true</static>").text(), "Only fixed joints are permitted in static models"),
 ]

@@ -33,8 +33,8 @@ from tests.support.system_checks import context_with, evaluate, port_sizes
 from tests.support.tubes import BUDGET, tubed_problem
 
 CELL = {
-    "object_state": [3.1, 3.2, 0.3, 0.2, -0.1, 0.4],
-    "governor_position": [3.2, 3.15],
+    "object_state": [4.15, 3.2, 0.3, 0.2, -0.1, 0.4],
+    "governor_position": [4.1, 3.15],
     "current_cell": [1.0, 2.0],
 }
 
@@ -44,6 +44,7 @@ def test_a_slower_clock_slows_the_governor_alone(cells):
     paced = ReferenceGovernor(cells, paced=True)
     slowed = evaluate(paced, {**CELL, "clock": [0.1, 0.25, -0.5]}, "governor_command")
     np.testing.assert_array_equal(slowed, [*(0.25 * command[:2]), *command[2:]])
+    assert np.linalg.norm(command[:2]) > 0.0
 
 
 @pytest.mark.parametrize("index", [-1, 3])

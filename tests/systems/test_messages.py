@@ -6,6 +6,7 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder, LeafSystem
 from pydrake.systems.primitives import ZeroOrderHold
 
+from coop_drake.laws.axis_table import ENERGY_BOUND, track_row
 from coop_drake.laws.measurements import whole_periods
 from coop_drake.laws.ppc import HOLD_RATE, SETTLING_TIME
 from coop_drake.systems import (
@@ -17,6 +18,7 @@ from coop_drake.systems import (
     MessageChannel,
     axis_laws,
 )
+from coop_drake.systems.holds import RELEASE
 from tests.support.small_plan import small_plan
 from tests.support.system_checks import context_with, evaluate, port_sizes
 
@@ -245,6 +247,23 @@ def test_a_robot_asks_when_its_energy_is_too_large_or_its_margin_negative():
     assert request.Eval(advanced(simulator, 4e-3, energy_margin=[-1e-9]))[0] == 1.0
     assert request.Eval(advanced(simulator, 5e-3, energy_margin=[0.4]))[0] == 0.0
     assert request.Eval(advanced(simulator, 6e-3, missed=[1.0]))[0] == 1.0
+
+
+def test_a_robot_asks_above_its_limit_until_the_energy_is_a_share_of_it():
+    law, asked = axis_laws(HELD_PLAN, [0, 1])[0], {}
+    monitor = HoldMonitor([law], 2.0)
+    simulator = Simulator(monitor, context_with(monitor, MIDDLE))
+    request = monitor.GetOutputPort("hold_request")
+    for rates, wanted in ((np.arange(0.0, 3.0, 0.002), 1.0), (np.arange(3.0, 0.0, -0.002), 0.0)):
+        for rate in rates:
+            state = [*MIDDLE["object_state"][:5], rate]
+            until = simulator.get_context().get_time() + 1e-6
+            if request.Eval(advanced(simulator, until, object_state=state))[0] == wanted:
+                energy = track_row(law.table[0], until, 0.2, rate)[1]
+                asked[wanted] = energy / law.table[0, ENERGY_BOUND]
+                break
+    assert asked[1.0] == pytest.approx(2.0, rel=0.02)
+    assert asked[0.0] == pytest.approx(2.0 * RELEASE, rel=0.02)
 
 
 def test_a_robot_that_hears_nothing_holds_by_itself():

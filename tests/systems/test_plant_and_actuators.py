@@ -23,6 +23,7 @@ from coop_drake.systems import (
     LimitedEffort,
     ObjectEstimator,
     TeamSensor,
+    WheelSlips,
     WrenchLaw,
     build_separate_sensor,
 )
@@ -194,6 +195,14 @@ def test_friction_opposes_motion_and_is_no_stronger_than_stated(vx, vy, coulomb,
     assert np.hypot(*force) <= (coulomb + viscous * speed) * (1.0 + 1e-12)
     if speed > 10.0 * CREEP_SPEED:
         assert np.hypot(*force) >= 0.99 * (coulomb + viscous * speed)
+
+
+def test_wheels_that_slip_lose_their_share_for_their_time():
+    block = WheelSlips(np.array([[1.0, np.inf], [2.0, np.inf], [0.3, 0.0]]))
+    driven = np.arange(1.0, 7.0)
+    for time, left in ((0.9, 1.0), (1.0, 0.7), (1.9, 0.7), (2.0, 1.0)):
+        passed = evaluate(block, {"driven": driven}, "passed", time)
+        np.testing.assert_allclose(passed, driven * [left, left, left, 1.0, 1.0, 1.0], rtol=1e-15)
 
 
 def test_every_base_has_its_own():
