@@ -6,21 +6,11 @@ import numpy as np
 import pytest
 from pydrake.systems.analysis import Simulator
 
+from coop_drake import scenario as sc
 from coop_drake.diagram import build_closed_loop
 from coop_drake.errors import ScenarioError
 from coop_drake.planning.planner import plan as plan_problem
 from coop_drake.plant import planning_problem, read_component_tree
-from coop_drake.scenario import (
-    Control,
-    Deafness,
-    Deployment,
-    Hold,
-    Messages,
-    Push,
-    RobotDepartures,
-    Silence,
-    load_scenario,
-)
 from coop_drake.scenario.checks import validate
 from coop_drake.simulation import Invariants, TeamClearance, build_maps, configure_simulator, simulate
 from coop_drake.simulation.telemetry import Telemetry
@@ -41,7 +31,7 @@ SPEED, RATE = 0.01, 0.02
 @pytest.fixture(scope="module")
 def base():
     """The loop of base that can be told to hold, and its contexts at random moments of a run."""
-    scenario = replace(load_scenario("base"), control=Control(hold=Hold()))
+    scenario = replace(sc.load_scenario("base"), control=sc.Control(hold=sc.Hold()))
     problem = planning_problem(scenario)
     plan = plan_problem(problem, scenario.gain_sets["scheduled"], gain_set_name="scheduled").plan
     loop = build_closed_loop(scenario, plan, build_maps(plan))
@@ -107,9 +97,9 @@ def test_it_arrives_when_it_is_released(base, number):
 def held_run(hold, robots=None, *, arrives=True, max_time=30.0, **departures):
     """The log of a held run at 200 Hz with departures, and the times at which it was held."""
     scenario, plan = small_problem("base")
-    deployment = Deployment(control_rate=200.0, robots=robots or {}, **departures)
+    deployment = sc.Deployment(control_rate=200.0, robots=robots or {}, **departures)
     simulator = replace(scenario.simulator, max_time=max_time)
-    scenario = replace(scenario, control=Control(hold=hold), deployment=deployment, simulator=simulator)
+    scenario = replace(scenario, control=sc.Control(hold=hold), deployment=deployment, simulator=simulator)
     log = simulate(scenario, plan, small_maps())
     if arrives:
         assert (log.reached, log.violation) == (True, "")
@@ -126,7 +116,7 @@ def assert_rests(log, begin, end):
 def test_a_scheduled_hold_costs_its_time_and_no_more():
     scenario, plan = small_problem("base")
     free = simulate(scenario, plan, small_maps())
-    scenario = replace(scenario, control=Control(hold=Hold(at=(0.2, 0.9), duration=1.5)))
+    scenario = replace(scenario, control=sc.Control(hold=sc.Hold(at=(0.2, 0.9), duration=1.5)))
     log = simulate(scenario, plan, small_maps())
     assert (log.reached, log.violation) == (True, "")
     told = 2.2  # from 0.2 s to 2.4 s: the second begins in the first
@@ -138,8 +128,8 @@ def test_a_scheduled_hold_costs_its_time_and_no_more():
 
 @pytest.mark.slow
 def test_a_silent_robot_holds_the_team_until_it_is_heard_again():
-    silent = {"robot_1": RobotDepartures(silence=Silence(begin=0.5, duration=2.0))}
-    log, held = held_run(Hold(silence=0.1), silent)
+    silent = {"robot_1": sc.RobotDepartures(silence=sc.Silence(begin=0.5, duration=2.0))}
+    log, held = held_run(sc.Hold(silence=0.1), silent)
     assert 0.6 <= held[0] <= 0.65
     assert 2.45 <= held[-1] <= 2.55
     assert_rests(log, 0.6 + REST_TIME, 2.5)
@@ -151,9 +141,9 @@ def test_a_robot_that_misses_the_order_holds_by_itself_and_the_team_arrives(seed
     """At a random moment one robot hears nothing any more; shortly afterwards the team is told to hold."""
     generator = np.random.default_rng(seed)
     begin, told = generator.uniform(0.1, 0.9), seed % 2 == 0
-    deaf = {f"robot_{seed // 2}": RobotDepartures(deaf=Deafness(begin=begin, duration=2.2))}
-    order = Hold(at=(begin + 0.02,) if told else (), duration=1.0, silence=0.1)
-    log, held = held_run(order, deaf, messages=Messages(loss=0.2), seed=seed)
+    deaf = {f"robot_{seed // 2}": sc.RobotDepartures(deaf=sc.Deafness(begin=begin, duration=2.2))}
+    order = sc.Hold(at=(begin + 0.02,) if told else (), duration=1.0, silence=0.1)
+    log, held = held_run(order, deaf, messages=sc.Messages(loss=0.2), seed=seed)
     assert held[0] == pytest.approx(begin + (0.02 if told else 0.1), abs=0.05)
     assert held[-1] == pytest.approx(begin + 2.2, abs=0.05)  # it is released when that robot hears again
     assert_rests(log, begin + 0.1 + REST_TIME, begin + 2.2)
@@ -161,27 +151,27 @@ def test_a_robot_that_misses_the_order_holds_by_itself_and_the_team_arrives(seed
 
 @pytest.mark.slow
 def test_without_a_time_out_a_deaf_robot_goes_on_alone():
-    deaf = {"robot_0": RobotDepartures(deaf=Deafness(begin=0.2, duration=1.5))}
+    deaf = {"robot_0": sc.RobotDepartures(deaf=sc.Deafness(begin=0.2, duration=1.5))}
     for silence, lag in ((0.1, 1.4), (None, 0.0)):  # of its clock, from 0.3 s, when it holds, to 1.7 s
-        log, _ = held_run(Hold(at=(0.25,), duration=1.0, silence=silence), deaf, arrives=False)
+        log, _ = held_run(sc.Hold(at=(0.25,), duration=1.0, silence=silence), deaf, arrives=False)
         assert log.clock_lag.max() == pytest.approx(lag, abs=0.1 if lag else 0.0)
 
 
 def test_a_robot_that_is_pushed_asks_for_a_hold_until_it_has_recovered():
-    push = Push("robot_0", (220.0, 0.0), time=0.5, duration=0.5)
-    _, held = held_run(Hold(energy=3.0), pushes=(push,))
+    push = sc.Push("robot_0", (220.0, 0.0), time=0.5, duration=0.5)
+    _, held = held_run(sc.Hold(energy=3.0), pushes=(push,))
     assert 0.5 < held[0] < 0.6
     assert held[-1] < 2.0
 
 
 def test_a_team_that_is_never_released_says_why_it_waits():
-    silent = {"robot_0": RobotDepartures(silence=Silence(begin=0.3))}
-    log, _ = held_run(Hold(silence=0.1), silent, arrives=False, max_time=2.0)
+    silent = {"robot_0": sc.RobotDepartures(silence=sc.Silence(begin=0.3))}
+    log, _ = held_run(sc.Hold(silence=0.1), silent, arrives=False, max_time=2.0)
     assert not log.reached
     assert "it waits until the hold ends: robot 0 is not heard" in log.violation
 
 
 def test_a_hold_after_silence_needs_a_control_rate():
-    scenario = replace(small_problem("base")[0], control=Control(hold=Hold(silence=0.1)))
+    scenario = replace(small_problem("base")[0], control=sc.Control(hold=sc.Hold(silence=0.1)))
     with pytest.raises(ScenarioError, match=r"control\.hold\.silence: 0\.1 is not allowed"):
         validate(scenario)

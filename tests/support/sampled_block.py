@@ -18,14 +18,7 @@ from coop_drake.compiled_loop.loop import update
 from coop_drake.compiled_loop.robots import compute, heard_cell, read_own
 from coop_drake.compiled_loop.running import believed, departures_of, memory_of, nominal_of
 from coop_drake.compiled_loop.watching import left_by_all
-from coop_drake.diagram.station import (
-    Loop,
-    Outputs,
-    PortRow,
-    TransportStation,
-    _drive_robots,
-    _measure,
-)
+from coop_drake.diagram import station as stations
 from coop_drake.jit import compiled
 from coop_drake.laws.actuators import lag_behind
 from coop_drake.laws.axis_table import write_bounds
@@ -171,12 +164,12 @@ class SampledTeam(Block):
 
 
 @dataclass(frozen=True)
-class SampledLoop(Loop):
+class SampledLoop(stations.Loop):
     """Drake's plant, and one block that computes what a sampled team computes."""
 
     controllers: SampledTeam
 
-    def outputs(self, ports: PortRow) -> Outputs:
+    def outputs(self, ports: stations.PortRow) -> stations.Outputs:
         """Add all outputs that are logged, and return where they stand."""
         joints = [len(robot.joints) for robot in self.team.robots]
         told, efforts = ports.add(self.controllers, "telemetry"), ports.add(self.controllers, "efforts")
@@ -196,7 +189,9 @@ class SampledLoop(Loop):
             for own, funnels in zip(shown, of_axes, strict=True)
         ]
         supervisor = {"current_cell": told[:2], "arrived": told[2:3]}
-        return Outputs(robots, supervisor, np.split(efforts, np.cumsum([3 + n for n in joints])[:-1]))
+        return stations.Outputs(
+            robots, supervisor, np.split(efforts, np.cumsum([3 + n for n in joints])[:-1])
+        )
 
 
 def build_sampled_loop(transport: CompiledTransport, deployment: Deployment | None = None) -> SampledLoop:
@@ -234,13 +229,13 @@ def simulate_sampled(transport: CompiledTransport, deployment: Deployment | None
         loop.release()
 
 
-def _driven_station(scenario: Scenario) -> TransportStation:
+def _driven_station(scenario: Scenario) -> stations.TransportStation:
     """Build the ideal team's plant as a station that also shows the plant's state, for the block."""
     builder = DiagramBuilder()
     team = build_team_plant(scenario, builder)
     tilt_floor(team, scenario.deployment.floor)
-    _drive_robots(builder, team, _measure(builder, team))
+    stations._drive_robots(builder, team, stations._measure(builder, team))
     builder.ExportOutput(team.plant.get_state_output_port(), "team_state")
     builder.ExportOutput(team.plant.get_generalized_acceleration_output_port(), "generalized_acceleration")
     builder.ExportOutput(team.scene_graph.get_query_output_port(), "query_object")
-    return TransportStation(builder.Build(), team)
+    return stations.TransportStation(builder.Build(), team)

@@ -26,15 +26,7 @@ from coop_drake.planning.questions import relaxed
 from coop_drake.planning.sampling.collision import densified
 from coop_drake.planning.search import find_channel
 from coop_drake.plant.chain import planar_pose
-from coop_drake.tree.component_tree import (
-    Body,
-    Component,
-    ComponentTree,
-    ConvexShape,
-    TreeJoint,
-    configuration_scale,
-    nearest_turn,
-)
+from coop_drake.tree import component_tree
 from coop_drake.verification.answer import same_angle
 from tests.support.cases import case, team_tree
 from tests.support.free_positions import FreePositions, wall_edges
@@ -129,8 +121,8 @@ def test_whole_turns_of_start_and_goal_change_no_answer(
 def test_every_part_takes_angles_apart_by_whole_turns_for_one(angle: float, turns: int) -> None:
     turned = angle + 2.0 * np.pi * turns
     assert same_angle(angle, turned)
-    assert same_angle(nearest_turn(turned), angle)
-    assert nearest_turn(turned - angle) == pytest.approx(0.0, abs=1e-12)
+    assert same_angle(component_tree.nearest_turn(turned), angle)
+    assert component_tree.nearest_turn(turned - angle) == pytest.approx(0.0, abs=1e-12)
     assert same_angle(
         planar_pose(RigidTransform(RotationMatrix.MakeZRotation(turned), np.zeros(3))).angle, angle
     )
@@ -159,7 +151,7 @@ def test_a_moved_team_stands_where_its_image_stands(similarity: Similarity, slid
     assert max(gaps.min(axis=0).max(), gaps.min(axis=1).max()) < 1e-9 * (1e4 + similarity.scale)
 
 
-def _sliding(joint: TreeJoint) -> TreeJoint:
+def _sliding(joint: component_tree.TreeJoint) -> component_tree.TreeJoint:
     return replace(joint, kind="prismatic", axis=(0.6, 0.8))
 
 
@@ -233,8 +225,10 @@ def test_no_answer_contradicts_the_exact_one(floor: Polygon, seed: int) -> None:
     length, breadth = random.uniform(0.3, 1.3), random.uniform(0.05, 0.4)
     corners = np.array([[-length, -breadth], [length, -breadth], [length, breadth], [-length, breadth]]) / 2
     ring = (corners + random.uniform(-0.3, 0.3, 2))[: random.integers(3, 5)]
-    body = Body("object", None, (ConvexShape(ring),))
-    tree = ComponentTree((Component("object", None, None, (body,)),), frozenset())
+    body = component_tree.Body("object", None, (component_tree.ConvexShape(ring),))
+    tree = component_tree.ComponentTree(
+        (component_tree.Component("object", None, None, (body,)),), frozenset()
+    )
     start, goal = (free_pose(tree, floor, random) for _ in range(2))
     few = PlannerSettings(max_slices=300)
     answer, _ = find_channel(PlanningProblem(floor, tree, start, goal, (), settings=few))
@@ -245,7 +239,7 @@ def test_no_answer_contradicts_the_exact_one(floor: Polygon, seed: int) -> None:
         assert not is_joined(floor, Polygon(ring), start, goal, LAYERS, hair)
 
 
-def free_pose(tree: ComponentTree, floor: Polygon, random: np.random.Generator) -> np.ndarray:
+def free_pose(tree: component_tree.ComponentTree, floor: Polygon, random: np.random.Generator) -> np.ndarray:
     for _ in range(50):
         angle = random.uniform(-np.pi, np.pi)
         places = random.uniform(floor.bounds[:2], floor.bounds[2:], (20, 2))
@@ -273,7 +267,9 @@ def planted(draw: st.DrawFn, robots: tuple[int, int] = (1, 3), joints: tuple[int
     tree = draw(trees(robots, joints))
     random = np.random.default_rng(draw(st.integers(0, 1_000_000)))
     room = draw(st.sampled_from((0.03, 0.06, 0.15)))
-    path = densified(_stops(tree, random, draw(st.integers(2, 3))), configuration_scale(tree), _STEP)
+    path = densified(
+        _stops(tree, random, draw(st.integers(2, 3))), component_tree.configuration_scale(tree), _STEP
+    )
     floor = shapely.union_all(_pieces(tree, path)).buffer(room, quad_segs=2)
     floor = floor.simplify(0.4 * room)
     assume(isinstance(floor, Polygon))
@@ -293,7 +289,7 @@ def planted(draw: st.DrawFn, robots: tuple[int, int] = (1, 3), joints: tuple[int
     return Planted(problem, path)
 
 
-def _stops(tree: ComponentTree, random: np.random.Generator, legs: int) -> np.ndarray:
+def _stops(tree: component_tree.ComponentTree, random: np.random.Generator, legs: int) -> np.ndarray:
     """Configurations without self-collision, each some way from the one before, shape (legs + 1, 3 + n)."""
     lower, upper = tree.range_lower, tree.range_upper
     start = np.concatenate((np.zeros(2), random.uniform(-np.pi, np.pi, 1), 0.5 * (lower + upper)))
@@ -309,7 +305,7 @@ def _stops(tree: ComponentTree, random: np.random.Generator, legs: int) -> np.nd
     return np.array(corners)
 
 
-def _pieces(tree: ComponentTree, path: np.ndarray) -> list[BaseGeometry]:
+def _pieces(tree: component_tree.ComponentTree, path: np.ndarray) -> list[BaseGeometry]:
     """Every convex piece at every configuration of a path."""
     return [
         placed_shape(shape, X_WC, quad_segs=8)

@@ -32,14 +32,7 @@ from coop_drake.errors import RefusalError
 from coop_drake.progress import Progress
 from coop_drake.tree.pose import FloatArray
 from coop_drake.verification.checks import Check, Verified
-from coop_drake.verification.runs.bodies import (
-    check_clearances,
-    check_grasps,
-    check_mechanics,
-    check_run_efforts,
-    check_run_speeds,
-    check_wrenches,
-)
+from coop_drake.verification.runs import bodies
 from coop_drake.verification.runs.budget import check_budget_used, check_nominal_reports
 from coop_drake.verification.runs.laws import (
     check_cells,
@@ -150,13 +143,13 @@ def verify_log(
     checks.append(check_motion(rows, between))
     if not braked:
         checks += _check_laws(rows, between, problem, setup)
-    checks += [check_grasps(rows, problem, setup), check_wrenches(rows, setup)]
+    checks += [bodies.check_grasps(rows, problem, setup), bodies.check_wrenches(rows, setup)]
     if setup.mechanics:
-        checks.append(check_mechanics(rows, problem, setup))
-    kept = check_run_speeds(rows, problem)
+        checks.append(bodies.check_mechanics(rows, problem, setup))
+    kept = bodies.check_run_speeds(rows, problem)
     checks += [] if kept is None else [kept]
-    checks += check_run_efforts(rows, problem)
-    checks += check_clearances(rows, between, problem, progress)
+    checks += bodies.check_run_efforts(rows, problem)
+    checks += bodies.check_clearances(rows, between, problem, progress)
     if not braked:
         checks += check_budget_used(rows)
         robots = [joint.robot for joint in problem.tree.joints]
