@@ -362,3 +362,35 @@ def _checked(shape: ConvexShape) -> ConvexShape:
     if not extent <= _LARGEST:
         raise TypeError(f"it reaches {extent:.3g} m from its joint")
     return shape
+
+
+# Which bodies of the plant make up the components of a tree that was read.
+
+
+def component_bodies(team: TeamPlant, tree: ComponentTree) -> tuple[list[set[int]], list[FloatArray]]:
+    """Return the indices of the bodies of every component, and its origin where all joints are at zero [m].
+
+    Args:
+        team: The team.
+        tree: Its component tree.
+    """
+    origins, groups = [np.zeros(2)], [_welded(team, team.object_body)]
+    for component in tree.components[1:]:
+        assert component.joint is not None
+        assert component.parent is not None
+        joint = team.joints[component.joint.index]
+        sides = [joint.parent_body(), joint.child_body()]
+        outer = sides[1] if int(sides[0].index()) in groups[component.parent] else sides[0]
+        groups.append(_welded(team, outer))
+        origins.append(origins[component.parent] + (component.joint.X_PJ.x, component.joint.X_PJ.y))
+    return groups, origins
+
+
+def _welded(team: TeamPlant, body: RigidBody) -> set[int]:
+    return {int(part.index()) for part in team.plant.GetBodiesWeldedTo(body)}
+
+
+def base_components(team: TeamPlant, groups: list[set[int]]) -> tuple[int, ...]:
+    """Return the component of every robot's base, given the bodies of every component."""
+    bases = [int(robot.base_body.index()) for robot in team.robots]
+    return tuple(next(i for i, group in enumerate(groups) if base in group) for base in bases)

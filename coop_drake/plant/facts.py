@@ -16,9 +16,9 @@ from coop_drake.answers.problem import PlanningProblem
 from coop_drake.errors import ScenarioError
 from coop_drake.laws import ScheduledGains
 from coop_drake.laws.couplings import disagreement_coupling, rate_terms
-from coop_drake.plant.component_tree import read_component_tree
+from coop_drake.plant.component_tree import base_components, component_bodies, read_component_tree
 from coop_drake.plant.parsing import bodies_of, joints_of, read_once
-from coop_drake.plant.planar_model import bodies_inertia, component_bodies, rotor_inertia
+from coop_drake.plant.planar_model import bodies_inertia, rotor_inertia
 from coop_drake.plant.team import TeamPlant, build_team_plant, displacement
 from coop_drake.scenario import Floor, Messages, Scenario
 from coop_drake.scenario.budget_file import ALL, POSITION, TeamMasses, read_budget
@@ -160,8 +160,7 @@ def base_frames(team: TeamPlant, tree: ComponentTree) -> tuple[tuple[float, ...]
     plant, (groups, origins) = team.plant, component_bodies(team, tree)
     context, frames = plant.CreateDefaultContext(), []
     plant.SetPositionsAndVelocities(context, np.zeros(plant.num_multibody_states()))
-    for robot in team.robots:
-        component = next(i for i, group in enumerate(groups) if int(robot.base_body.index()) in group)
+    for robot, component in zip(team.robots, base_components(team, groups), strict=True):
         place = plant.EvalBodyPoseInWorld(context, robot.base_body).translation()[:2] - origins[component]
         frames.append((float(component), *place.round(ROUNDED).tolist()))
     return tuple(frames)

@@ -26,6 +26,7 @@ from coop_drake.laws.robot_dynamics import (
     X,
     Y,
 )
+from coop_drake.plant.component_tree import base_components, component_bodies
 from coop_drake.plant.team import RobotModel, RobotPlant, TeamPlant
 from coop_drake.tree.component_tree import ComponentTree
 from coop_drake.tree.pose import FloatArray, IntArray
@@ -206,34 +207,13 @@ def read_team_tree(team: TeamPlant, components: ComponentTree) -> TeamTree:
             row[[POSITION, RATE]] = joint.position_start(), rates + joint.velocity_start()
             row[DAMPING] = joint.GetDampingVector(context)[0]
             row[ROTOR] = rotor_inertia(plant, context, joint)
-    bases = [robot.base_body for robot in team.robots]
-    places = [body.EvalPoseInWorld(context).translation()[:2] for body in bases]
-    numbers = [int(body.index()) for body in bases]
-    found = [next(i for i, group in enumerate(groups) if number in group) for number in numbers]
+    places = [robot.base_body.EvalPoseInWorld(context).translation()[:2] for robot in team.robots]
     drives = [plant.get_joint_actuator(index) for index in plant.GetJointActuatorIndices()]
     limit_of = {int(drive.joint().index()): drive.effort_limit() for drive in drives}
     strongest = np.array([limit_of.get(int(joint.index()), np.inf) for joint in team.joints], dtype=float)
-    return TeamTree(rows, np.array([*found, 0], dtype=np.int64), np.array([*places, np.zeros(2)]), strongest)
-
-
-def component_bodies(team: TeamPlant, tree: ComponentTree) -> tuple[list[set[int]], list[FloatArray]]:
-    """Return the indices of the bodies of every component, and its origin where all joints are at zero [m].
-
-    Args:
-        team: The team.
-        tree: Its component tree.
-    """
-    origins, groups = [np.zeros(2)], [_welded(team, team.object_body)]
-    for component in tree.components[1:]:
-        assert component.joint is not None
-        assert component.parent is not None
-        joint = team.joints[component.joint.index]
-        sides = [joint.parent_body(), joint.child_body()]
-        outer = sides[1] if int(sides[0].index()) in groups[component.parent] else sides[0]
-        groups.append(_welded(team, outer))
-        origins.append(origins[component.parent] + (component.joint.X_PJ.x, component.joint.X_PJ.y))
-    return groups, origins
-
-
-def _welded(team: TeamPlant, body: RigidBody) -> set[int]:
-    return {int(part.index()) for part in team.plant.GetBodiesWeldedTo(body)}
+    return TeamTree(
+        rows,
+        np.array([*base_components(team, groups), 0], dtype=np.int64),
+        np.array([*places, np.zeros(2)]),
+        strongest,
+    )

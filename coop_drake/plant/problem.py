@@ -19,7 +19,7 @@ from coop_drake.answers.limits import TeamLimits
 from coop_drake.answers.problem import PlanningProblem, object_radius
 from coop_drake.errors import ScenarioError
 from coop_drake.plant.chain import limits_of, planar_pose
-from coop_drake.plant.component_tree import read_component_tree
+from coop_drake.plant.component_tree import base_components, component_bodies, read_component_tree
 from coop_drake.plant.parsing import refusal
 from coop_drake.plant.team import RobotModel, TeamPlant, build_team_plant
 from coop_drake.scenario import Scenario, assemble
@@ -91,7 +91,7 @@ def read_limits(team: TeamPlant, tree: ComponentTree) -> TeamLimits:
     Raises:
         ScenarioError: A joint cannot move because a limit is zero.
     """
-    components = tuple(_base_component(team, tree, robot) for robot in team.robots)
+    components = base_components(team, component_bodies(team, tree)[0])
     poses = tree.poses(np.zeros(3 + len(tree.joints)))
     context = team.plant.CreateDefaultContext()
     team.plant.SetPositions(context, np.zeros(team.plant.num_positions()))
@@ -110,17 +110,6 @@ def read_limits(team: TeamPlant, tree: ComponentTree) -> TeamLimits:
         joint_accelerations=_of_joints(team, joints, "acceleration"),
         joint_efforts=np.array([_effort(team, joint) for _, joint, _ in joints]),
     )
-
-
-def _base_component(team: TeamPlant, tree: ComponentTree, robot: RobotModel) -> int:
-    """Index of the component of a base: the last one that a joint between object and base moves."""
-    joints = dict(zip(robot.joint_names, robot.joints, strict=True))
-    base, moving = robot.base_body.index(), 0
-    for index, component in enumerate(tree.components):  # parents before children
-        joint = None if component.joint is None else joints.get(component.joint.name)
-        if joint is not None and base in team.plant.GetBodiesKinematicallyAffectedBy([joint.index()]):
-            moving = index
-    return moving
 
 
 def _moving(team: TeamPlant) -> list[tuple[RobotModel, Joint, str]]:

@@ -30,10 +30,6 @@ class RobotDynamics(RobotPlant):
         """M of (22), shape (3 + n_k, 3 + n_k) [kg, kg m, kg m^2]."""
         return self.plant.CalcMassMatrix(self.context)[np.ix_(self.velocity_index, self.velocity_index)]
 
-    def bias(self) -> FloatArray:
-        """C z' + G of (22) with the joints' damping, shape (3 + n_k,) [N, N m]."""
-        return self._inverse_dynamics(np.zeros(len(self.velocity_index)))
-
     def inertial_effort(self, acceleration: FloatArray) -> FloatArray:
         """M z'' + C z' + G with the joints' damping, without any wrench at the grasp.
 
@@ -45,12 +41,9 @@ class RobotDynamics(RobotPlant):
         """
         ordered = np.empty(len(self.velocity_index))
         ordered[self.velocity_index] = acceleration
-        return self._inverse_dynamics(ordered)
-
-    def _inverse_dynamics(self, ordered_acceleration: FloatArray) -> FloatArray:
         forces = MultibodyForces(self.plant)
         self.plant.CalcForceElementsContribution(self.context, forces)
-        effort: FloatArray = self.plant.CalcInverseDynamics(self.context, ordered_acceleration, forces)
+        effort: FloatArray = self.plant.CalcInverseDynamics(self.context, ordered, forces)
         return effort[self.velocity_index]
 
     def grasp_jacobian(self) -> FloatArray:

@@ -22,19 +22,6 @@ def robot_acceleration(end_effector_acceleration, joint_acceleration, *, jacobia
     return np.concatenate([np.linalg.solve(jacobian[:, :3], wanted), joint_acceleration])
 
 
-def robot_torque(acceleration, wrench, *, mass_matrix, bias, jacobian):
-    """Return tau_m = M z'' + C z' + G + J^T tau_e of (22), shape (3 + n,).
-
-    Args:
-        acceleration: z'', shape (3 + n,).
-        wrench: tau_e that the robot applies to the object at E, shape (3,) [N, N m].
-        mass_matrix: M, shape (3 + n, 3 + n).
-        bias: C z' + G, shape (3 + n,).
-        jacobian: J, shape (3, 3 + n).
-    """
-    return mass_matrix @ acceleration + bias + jacobian.T @ wrench
-
-
 def consistent_projector(mass_matrix, jacobian):
     """Return I - J^T (J M^-1 J^T)^-1 J M^-1, the projector that (23) means: erratum E23.
 
