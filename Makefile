@@ -11,6 +11,8 @@ PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check -c const
 CODE := coop_drake tests benchmarks notebooks docs paper
 # The kernels are small; threads of BLAS would only get into each other's way.
 export OMP_NUM_THREADS ?= 1
+# Where nothing may be written, every process of a test would compile the package, and pytest all tests.
+unexport PYTHONDONTWRITEBYTECODE
 
 .PHONY: environment warm demo test test-slow test-all lint lint-types lint-rest bench campaigns notebooks docs gallery clean
 

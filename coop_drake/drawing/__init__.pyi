@@ -1,5 +1,4 @@
 from .canvas import (
-    BodyFootprint,
     draw_polygon,
     draw_team,
     draw_workspace,
@@ -7,10 +6,10 @@ from .canvas import (
     legend_above,
     new_figure,
     save_figure,
-    team_footprints,
     team_legend,
 )
 from .solids import (
+    BodyFootprint,
     TriangleMesh,
     camera_pose,
     extruded_section,
@@ -19,6 +18,7 @@ from .solids import (
     ribbon_mesh,
     ring_lines,
     slab_mesh,
+    team_footprints,
     tube_mesh,
     wall_polygons,
 )

@@ -4,14 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from contextlib import AbstractContextManager
-from dataclasses import dataclass
 from io import BytesIO
 from pathlib import Path
 from textwrap import fill
 from typing import Any
 
 import matplotlib as mpl
-import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import PathCollection
@@ -19,11 +17,12 @@ from matplotlib.colors import to_rgba_array
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch, PathPatch
 from matplotlib.path import Path as Outline
-from shapely import MultiPoint, Polygon, box, get_coordinates, union_all
+from shapely import Polygon, box, get_coordinates
 from shapely.geometry.base import BaseGeometry
 from shapely.geometry.polygon import orient
 
 from coop_drake.drawing.colours import FLOOR, GREY, INK, OBJECT, WALL, robot_colour
+from coop_drake.drawing.solids import team_footprints
 from coop_drake.files import write_atomically
 from coop_drake.tree.component_tree import ComponentTree
 from coop_drake.tree.pose import FloatArray
@@ -120,37 +119,6 @@ def picture_of(figure: Figure, ending: str = ".png", *, dpi: float = DPI) -> byt
 
 
 # Floors and bodies on axes.
-
-# Footprints of the team on the floor at one configuration.
-
-
-@dataclass(frozen=True)
-class BodyFootprint:
-    """Where one body stands.
-
-    Attributes:
-        name: Scoped name of the body.
-        robot: Index of its robot, None for the object.
-        shape: Its projection to the floor, in W [m].
-    """
-
-    name: str
-    robot: int | None
-    shape: BaseGeometry
-
-
-def team_footprints(tree: ComponentTree, configuration: FloatArray) -> list[BodyFootprint]:
-    """Return the footprint of every body at z = (x, y, theta, q...), shape (3 + n,), the object's first."""
-    footprints = []
-    for component, X_WC in zip(tree.components, tree.poses(configuration), strict=True):
-        for body in component.bodies:
-            hulls = [
-                MultiPoint(X_WC.apply(np.atleast_2d(shape.vertices))).convex_hull.buffer(shape.radius)
-                for shape in body.shapes
-            ]
-            footprints.append(BodyFootprint(body.name, body.robot, union_all(hulls)))
-    return sorted(footprints, key=lambda footprint: footprint.robot is not None)
-
 
 # Drawing the floor plan and the team on it.
 

@@ -1,4 +1,4 @@
-"""Solids, cameras and the player of scenes in Meshcat."""
+"""Solids, cameras and the player of scenes in Meshcat, and footprints of bodies; needs no matplotlib."""
 
 from __future__ import annotations
 
@@ -11,11 +11,13 @@ import numpy as np
 import shapely
 from manifold3d import CrossSection
 from numpy.typing import NDArray
-from shapely import Polygon, constrained_delaunay_triangles
+from shapely import MultiPoint, Polygon, constrained_delaunay_triangles, union_all
+from shapely.geometry.base import BaseGeometry
 
 from coop_drake.drawing import colours
 from coop_drake.geometry.polygons import parts_of
 from coop_drake.templates import rendered
+from coop_drake.tree.component_tree import ComponentTree
 from coop_drake.tree.pose import FloatArray
 
 # Where to stand to see the whole floor.
@@ -215,3 +217,34 @@ def _mesh(corners: FloatArray) -> TriangleMesh:
     """Return the mesh of triangles of shape (f, 3, 3); corners that several share are kept once."""
     vertices, faces = np.unique(corners.reshape(-1, 3), axis=0, return_inverse=True)
     return TriangleMesh(vertices, faces.reshape(-1, 3).astype(np.int32))
+
+
+# Footprints of the team on the floor at one configuration.
+
+
+@dataclass(frozen=True)
+class BodyFootprint:
+    """Where one body stands.
+
+    Attributes:
+        name: Scoped name of the body.
+        robot: Index of its robot, None for the object.
+        shape: Its projection to the floor, in W [m].
+    """
+
+    name: str
+    robot: int | None
+    shape: BaseGeometry
+
+
+def team_footprints(tree: ComponentTree, configuration: FloatArray) -> list[BodyFootprint]:
+    """Return the footprint of every body at z = (x, y, theta, q...), shape (3 + n,), the object's first."""
+    footprints = []
+    for component, X_WC in zip(tree.components, tree.poses(configuration), strict=True):
+        for body in component.bodies:
+            hulls = [
+                MultiPoint(X_WC.apply(np.atleast_2d(shape.vertices))).convex_hull.buffer(shape.radius)
+                for shape in body.shapes
+            ]
+            footprints.append(BodyFootprint(body.name, body.robot, union_all(hulls)))
+    return sorted(footprints, key=lambda footprint: footprint.robot is not None)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from pydrake.multibody.plant import MultibodyPlant
@@ -25,8 +25,10 @@ from coop_drake.scenario.budget_file import ALL, POSITION, TeamMasses, read_budg
 from coop_drake.tree.component_tree import Bodies, ComponentTree
 from coop_drake.tree.pose import FloatArray
 from coop_drake.typed_data import to_plain
-from coop_drake.verification.budget_origin import Facts, OwnBudgets, ScenarioBudgets, wrong_facts
-from coop_drake.verification.runs import BodyMass, RunSetup
+
+if TYPE_CHECKING:  # Simulating takes a digest from here, and should not wait for the verifier.
+    from coop_drake.verification.budget_origin import Facts, OwnBudgets, ScenarioBudgets
+    from coop_drake.verification.runs import BodyMass, RunSetup
 
 # Digests of a scenario and its models: which scenario a log belongs to, and what processes must agree on.
 
@@ -115,6 +117,8 @@ def run_setup(scenario: Scenario) -> RunSetup:
     Raises:
         ScenarioError: The models do not make a team.
     """
+    from coop_drake.verification.runs.rows import RunSetup
+
     team = build_team_plant(scenario, DiagramBuilder())
     context, deployment = team.plant.CreateDefaultContext(), scenario.deployment
     springs = team.plant.num_force_elements() > 1  # every plant has gravity
@@ -260,6 +264,8 @@ def budget_of(choice: str | None, scenario: Scenario, problem: PlanningProblem) 
     Raises:
         ScenarioError: The budget cannot be read, or no budget can be shown for the scenario's gains.
     """
+    from coop_drake.verification.budget_origin import wrong_facts
+
     required = scenario.deployment.budget
     if choice is None and required == "none":
         return None
@@ -279,6 +285,8 @@ def budget_of(choice: str | None, scenario: Scenario, problem: PlanningProblem) 
 
 def scenario_budgets(scenario: Scenario, problem: PlanningProblem) -> ScenarioBudgets:
     """Return what a scenario says about budgets, with which ``verify`` compares that of a plan."""
+    from coop_drake.verification.budget_origin import ScenarioBudgets
+
     return ScenarioBudgets(scenario.deployment.budget, partial(_own_budgets, scenario, problem))
 
 
@@ -288,6 +296,8 @@ def _own_budgets(scenario: Scenario, problem: PlanningProblem) -> OwnBudgets:
     Raises:
         ScenarioError: The scenario requires a budget, but has departures that none counts.
     """
+    from coop_drake.verification.budget_origin import OwnBudgets
+
     masses, own, missing = _of_models(scenario), dict[str, Budget](), ""
     for choice in (ALL, POSITION):
         try:
@@ -301,6 +311,8 @@ def _own_budgets(scenario: Scenario, problem: PlanningProblem) -> OwnBudgets:
 
 def _facts(scenario: Scenario, masses: TeamMasses) -> Facts:
     """Return what no budget of a scenario may state otherwise."""
+    from coop_drake.verification.budget_origin import Facts
+
     limits = {name: getattr(scenario.deployment.actuators, name) for name in LIMITS}
     return Facts(masses.bodies, masses.bases, masses.rotors, masses.dampings, limits)
 

@@ -25,7 +25,6 @@ from shapely import MultiLineString, Point, Polygon, box, minimum_rotated_rectan
 from shapely.geometry.base import BaseGeometry
 
 from coop_drake.answers.plan import Plan
-from coop_drake.drawing.canvas import team_footprints
 from coop_drake.drawing.colours import (
     BLUE,
     EDGE,
@@ -50,6 +49,7 @@ from coop_drake.drawing.solids import (
     ribbon_mesh,
     ring_lines,
     slab_mesh,
+    team_footprints,
     wall_polygons,
 )
 from coop_drake.geometry.polygons import component_at, parts_of

@@ -26,13 +26,13 @@ from shapely.affinity import affine_transform
 
 from coop_drake.answers.problem import PlanningProblem, at_goal
 from coop_drake.drawing import colours
-from coop_drake.drawing.canvas import team_footprints
 from coop_drake.drawing.solids import (
     TriangleMesh,
     camera_pose,
     extruded_section,
     joined,
     slab_mesh,
+    team_footprints,
     tube_mesh,
     wall_polygons,
 )
