@@ -5,9 +5,9 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
-from dataclasses import asdict, astuple, dataclass, fields
+from dataclasses import astuple, dataclass, fields
 from functools import cache
-from math import isnan, nan
+from math import nan
 from pathlib import Path
 from pkgutil import resolve_name
 from typing import TYPE_CHECKING, Any, get_args, get_type_hints
@@ -314,70 +314,33 @@ def write_table(path: Path, table: pyarrow.Table) -> None:
     write_atomically(path, lambda stream: pyarrow.parquet.write_table(table, stream))
 
 
-@dataclass(frozen=True)
-class State:
-    """Runs of one scenario in one tier.
+def state_of(campaign: Campaign, folder: CampaignFolder, batches: Sequence[Batch]) -> list[dict[str, Any]]:
+    """Return the state of every scenario and tier that a campaign has runs of.
 
-    Attributes:
-        scenario: Name of the scenario.
-        tier: The tier.
-        runs: How many there shall be.
-        done: How many are there.
-        lost: How many of these did not arrive.
-        funnel_margin: Least distance of an axis to a bound of its funnel, NaN if none is known [rad or m].
-        clearance: Least distance to walls and between bodies, NaN if none is known [m].
-        budget_share: Largest share used of what the plan's budget states, NaN if none is known [-].
-        cpu_seconds: Processor time of a run, with its share of starting processes, NaN if not known [s].
+    Each has ``scenario`` and ``tier``; how many ``runs`` there shall be, how many are ``done``, and how many
+    of these were ``lost``; the least ``funnel_margin`` [rad or m] and ``clearance`` to walls and between
+    bodies [m]; the largest ``budget_share`` [-]; the ``cpu_seconds`` of a run with its share of starting
+    processes. What is not known is NaN.
     """
-
-    scenario: str
-    tier: str
-    runs: int
-    done: int
-    lost: int
-    funnel_margin: float
-    clearance: float
-    budget_share: float
-    cpu_seconds: float
-
-    def facts(self) -> dict[str, Any]:
-        """Return all by name; null where nothing is known."""
-        content = asdict(self)
-        return {key: None if isinstance(v, float) and isnan(v) else v for key, v in content.items()}
-
-    def cells(self) -> tuple[str, ...]:
-        """Return a row of a table: distances in rad and m, and seconds."""
-        margins = (
-            f"{self.funnel_margin:.4f}",
-            f"{self.clearance:.4f}",
-            f"{100.0 * self.budget_share:.1f} %",
-            f"{self.cpu_seconds:.3f}",
-        )
-        shown = ("" if text.startswith("nan") else text for text in margins)
-        return f"{self.scenario}, {self.tier}", str(self.runs), str(self.done), str(self.lost), *shown
-
-
-def state_of(campaign: Campaign, folder: CampaignFolder, batches: Sequence[Batch]) -> tuple[State, ...]:
-    """Return the state of every scenario and tier that a campaign has runs of."""
     rows = []
     for key in dict.fromkeys((batch.scenario, batch.tier) for batch in batches):
         mine = [batch for batch in batches if (batch.scenario, batch.tier) == key]
         table = folder.table(mine)
         column = {name: table.column(name).to_numpy() for name in _COLUMNS}
         rows.append(
-            State(
-                Variation(campaign).scenarios[key[0]].name,
-                key[1],
-                sum(batch.stop - batch.first for batch in mine),
-                table.num_rows,
-                int((~column["arrived"]).sum()),
-                _least(column["funnel_margin"]),
-                _least(np.concatenate([column[name] for name in _CLEARANCES])),
-                -_least(-column["budget_share"]),
-                folder.cpu_seconds(mine),
-            )
+            {
+                "scenario": Variation(campaign).scenarios[key[0]].name,
+                "tier": key[1],
+                "runs": sum(batch.stop - batch.first for batch in mine),
+                "done": table.num_rows,
+                "lost": int((~column["arrived"]).sum()),
+                "funnel_margin": _least(column["funnel_margin"]),
+                "clearance": _least(np.concatenate([column[name] for name in _CLEARANCES])),
+                "budget_share": -_least(-column["budget_share"]),
+                "cpu_seconds": folder.cpu_seconds(mine),
+            }
         )
-    return tuple(rows)
+    return rows
 
 
 _CLEARANCES = ("wall_clearance", "body_clearance")

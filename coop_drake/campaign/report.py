@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import json
-import math
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from decimal import ROUND_CEILING, Context, Decimal
-from functools import cached_property
 from math import isnan, nan
 from pathlib import Path
 from typing import Any
@@ -17,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coop_drake.drawing import colours
-from coop_drake.files import write_atomically
+from coop_drake.files import plain_numbers, write_atomically
 from coop_drake.templates import rendered
 from coop_drake.tree.pose import FloatArray, IntArray
 
@@ -77,61 +75,24 @@ COSTS = (
 MEASURES = (*MARGINS, *COSTS)
 
 
-class Runs:
-    """A table of runs as arrays.
+Columns = dict[str, NDArray[Any]]
+"""The columns of a table of runs as arrays of shape (runs,), by their names."""
 
-    Args:
-        table: A pyarrow table with the columns of ``RunRecord``.
-    """
 
-    def __init__(self, table: Any) -> None:
-        self._table = table
-        self.count: int = table.num_rows
-        self.lost = ~np.asarray(table["arrived"].to_numpy(), dtype=bool)
+def count_trials(runs: Columns, chosen: NDArray[np.bool_] | None = None) -> int:
+    """Return how many trials have a chosen row, by default any: a run that two tiers made is one trial."""
+    rows = slice(None) if chosen is None else chosen
+    return len(set(zip(runs["scenario"][rows], runs["run"][rows], strict=True)))
 
-    def floats(self, name: str) -> FloatArray:
-        """Return a column of numbers, shape (runs,); NaN where a run has none."""
-        return np.asarray(self._table[name].to_numpy(), dtype=float)
 
-    def integers(self, name: str) -> IntArray:
-        """Return a column of whole numbers, shape (runs,)."""
-        return np.asarray(self._table[name].to_numpy(), dtype=np.int64)
-
-    def texts(self, name: str) -> list[str]:
-        """Return a column of texts."""
-        return [str(text) for text in self._table[name].to_pylist()]
-
-    def text(self, name: str, row: int) -> str:
-        """Return the text of a column in one row."""
-        return str(self._table[name][int(row)].as_py())
-
-    @cached_property
-    def trials(self) -> IntArray:
-        """The trial of every row, shape (runs,): runs of one scenario and index in two tiers are one."""
-        numbers = self.integers("run")
-        scenarios = np.empty(self.count, dtype=np.int64)
-        names = sorted({scenario for scenario, _, _ in self.groups})
-        for scenario, _, rows in self.groups:
-            scenarios[rows] = names.index(scenario)
-        pairs = scenarios * (numbers.max(initial=0) + 1) + numbers
-        return np.asarray(np.unique(pairs, return_inverse=True)[1], dtype=np.int64)
-
-    def count_trials(self, chosen: NDArray[np.bool_] | None = None) -> int:
-        """Return how many trials have a chosen row; by default, all trials."""
-        return int(np.unique(self.trials if chosen is None else self.trials[chosen]).size)
-
-    @cached_property
-    def groups(self) -> tuple[tuple[str, str, IntArray], ...]:
-        """Scenario, tier and row numbers of the runs that belong together, sorted by name."""
-        names = [self._table[name].combine_chunks().dictionary_encode() for name in ("scenario", "tier")]
-        codes = [np.asarray(name.indices.to_numpy(zero_copy_only=False)) for name in names]
-        first, second = ([str(text) for text in name.dictionary.to_pylist()] for name in names)
-        found = []
-        for scenario, tier in sorted((one, two) for one in first for two in second):
-            rows = np.flatnonzero((codes[0] == first.index(scenario)) & (codes[1] == second.index(tier)))
-            if rows.size:
-                found.append((scenario, tier, rows))
-        return tuple(found)
+def groups_of(runs: Columns) -> list[tuple[str, str, IntArray]]:
+    """Return scenario, tier and row numbers of the runs that belong together, sorted by name."""
+    names = np.array([runs["scenario"], runs["tier"]], dtype=str)
+    found, places = np.unique(names, axis=1, return_inverse=True)
+    return [
+        (str(scenario), str(tier), np.flatnonzero(places.ravel() == k))
+        for k, (scenario, tier) in enumerate(found.T)
+    ]
 
 
 # How often runs are lost: the share counted, and the bound below which the true one lies.
@@ -277,26 +238,16 @@ def _heights(numbers: FloatArray, ends: tuple[float, float]) -> tuple[int, ...]:
     return tuple(int(height) for height in np.histogram(numbers, bins=_BINS, range=ends)[0])
 
 
-def summarise(runs: Runs, confidence: float) -> tuple[Group, ...]:
+def summarise(runs: Columns, confidence: float) -> tuple[Group, ...]:
     """Return how the runs of every scenario and tier went."""
-    columns = {measure: runs.floats(measure.name) for measure in MEASURES}
     groups = []
-    for scenario, tier, rows in runs.groups:
-        lost = runs.lost[rows]
-        known = {
-            measure.name: distribution(column[rows] if measure.margin else column[rows][~lost])
-            for measure, column in columns.items()
-        }
-        counted = Counter(runs.text("reason", row) for row in rows[lost])
-        groups.append(
-            Group(
-                scenario,
-                tier,
-                loss_rate(int(lost.sum()), rows.size, confidence),
-                tuple(counted.most_common(_REASONS)),
-                {name: values for name, values in known.items() if values is not None},
-            )
-        )
+    for scenario, tier, rows in groups_of(runs):
+        arrived = rows[runs["arrived"][rows]]
+        known = {one.name: distribution(runs[one.name][rows if one.margin else arrived]) for one in MEASURES}
+        reasons = Counter(runs["reason"][rows[~runs["arrived"][rows]]].tolist()).most_common(_REASONS)
+        rate = loss_rate(rows.size - arrived.size, rows.size, confidence)
+        measures = {name: values for name, values in known.items() if values is not None}
+        groups.append(Group(scenario, tier, rate, tuple(reasons), measures))
     return tuple(groups)
 
 
@@ -337,39 +288,37 @@ class WorstRun:
     values: str
 
 
-def worst_runs(runs: Runs, count: int = LISTED) -> tuple[WorstRun, ...]:
+def worst_runs(runs: Columns, count: int = LISTED) -> tuple[WorstRun, ...]:
     """Return lost runs, then those that used more than the budget states, then those with the least margins.
 
     Margins count relative to the median of their scenario and tier.
     """
-    margins = np.array([runs.floats(measure.name) for measure in MARGINS])
+    margins = np.array([runs[measure.name] for measure in MARGINS])
     shares = np.full_like(margins, np.inf)
-    for _, _, rows in runs.groups:
+    for _, _, rows in groups_of(runs):
         for k in range(len(MARGINS)):
             known = margins[k, rows][np.isfinite(margins[k, rows])]
             if known.size and (typical := float(np.median(known))) > 0.0:
                 shares[k, rows] = margins[k, rows] / typical
     shares[np.isnan(shares)] = np.inf
-    numbers, used = runs.integers("run"), runs.floats(SHARE)
-    beyond = np.where(used > 1.0, -used, 0.0)
-    order = np.lexsort((numbers, shares.min(axis=0), beyond, ~runs.lost))[:count]
-    seeds, found = runs.integers("seed"), []
-    for row in order:
+    beyond = np.where(runs[SHARE] > 1.0, -runs[SHARE], 0.0)
+    found = []
+    for row in np.lexsort((runs["run"], shares.min(axis=0), beyond, runs["arrived"]))[:count]:
         k = int(np.argmin(shares[:, row]))
         known_share = bool(np.isfinite(shares[k, row]))
         found.append(
             WorstRun(
-                int(numbers[row]),
-                runs.text("scenario", row),
-                runs.text("tier", row),
-                int(seeds[row]),
-                not runs.lost[row],
-                runs.text("reason", row),
+                int(runs["run"][row]),
+                runs["scenario"][row],
+                runs["tier"][row],
+                int(runs["seed"][row]),
+                bool(runs["arrived"][row]),
+                runs["reason"][row],
                 MARGINS[k].name if known_share else "",
-                float(margins[k, row]) if known_share else float("nan"),
-                float(shares[k, row]) if known_share else float("nan"),
-                float(used[row]),
-                runs.text("values", row),
+                float(margins[k, row]) if known_share else nan,
+                float(shares[k, row]) if known_share else nan,
+                float(runs[SHARE][row]),
+                runs["values"][row],
             )
         )
     return tuple(found)
@@ -407,7 +356,7 @@ class Report:
 
     def to_json(self) -> str:
         """Return all numbers as JSON; numbers that are not finite are null."""
-        return json.dumps(_finite(asdict(self)), indent=1, ensure_ascii=False) + "\n"
+        return json.dumps(plain_numbers(asdict(self)), indent=1, ensure_ascii=False) + "\n"
 
 
 def make_report(
@@ -427,28 +376,19 @@ def make_report(
         missing: Batches of the campaign that are not made yet.
         confidence: Probability with which a true rate is not above its bound, at least [-].
     """
-    known = None if runs is None or runs.num_rows == 0 else Runs(runs)
-    used = np.empty(0) if known is None else known.floats(SHARE)
+    if runs is None or runs.num_rows == 0:
+        return Report(title, tuple(facts), None, 0, nan, (), (), missing)
+    known = {name: runs[name].to_numpy() for name in runs.column_names}
     return Report(
         title,
         tuple(facts),
-        None
-        if known is None
-        else loss_rate(known.count_trials(known.lost), known.count_trials(), confidence),
-        0 if known is None else known.count_trials(used > 1.0),
-        float(np.nanmax(used)) if np.isfinite(used).any() else math.nan,
-        () if known is None else summarise(known, confidence),
-        () if known is None else worst_runs(known),
+        loss_rate(count_trials(known, ~known["arrived"]), count_trials(known), confidence),
+        count_trials(known, known[SHARE] > 1.0),
+        float(np.nanmax(known[SHARE])) if np.isfinite(known[SHARE]).any() else nan,
+        summarise(known, confidence),
+        worst_runs(known),
         missing,
     )
-
-
-def _finite(value: Any) -> Any:
-    if isinstance(value, dict):
-        return {key: _finite(one) for key, one in value.items()}
-    if isinstance(value, list | tuple):
-        return [_finite(one) for one in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 # The report as one self-contained HTML page, and the same numbers as JSON.

@@ -166,17 +166,19 @@ def _show_state(
     from coop_drake.campaign.records import state_of
 
     rows = state_of(campaign, folder, batches)
-    reporter.facts.update(
-        folder=str(folder.path),
-        runs=sum(row.runs for row in rows),
-        done=sum(row.done for row in rows),
-        lost=sum(row.lost for row in rows),
-        rows=[row.facts() for row in rows],
-    )
+    reporter.facts.update({name: sum(row[name] for row in rows) for name in ("runs", "done", "lost")})
+    reporter.facts.update(folder=str(folder.path), rows=rows)
+    forms = ("{scenario}, {tier}", "{runs}", "{done}", "{lost}", "{funnel_margin:.4f}", "{clearance:.4f}")
+    forms_of_costs = ("{percent:.1f} %", "{cpu_seconds:.3f}")
+    texts = [
+        [form.format(**row, percent=100.0 * row["budget_share"]) for form in (*forms, *forms_of_costs)]
+        for row in rows
+    ]
+    shown = [(first, *("" if text.startswith("nan") else text for text in rest)) for first, *rest in texts]
     margins = "funnel\n(rad)", "clearance\n(m)", "of\nbudget"
     headings = ("runs", "done", "lost", *margins, "CPU\n(s)")  # Rows fit into 80 columns.
     title = f"{campaign.name}: least margins, largest share of the budget"
-    reporter.table(title, [row.cells() for row in rows], headings, "scenario, tier")
+    reporter.table(title, shown, headings, "scenario, tier")
     if reporter.facts["lost"]:
         reporter.code = ExitCode.FAILED_RUN
     if others := folder.by_other_sources(batches):

@@ -28,6 +28,7 @@ from coop_drake.errors import (
     StallError,
 )
 from coop_drake.extras import install_advice
+from coop_drake.files import plain_numbers
 from coop_drake.progress import Progress
 
 UsageError: Any = typer.BadParameter.__base__
@@ -208,7 +209,7 @@ class Reporter:
     def close(self) -> None:
         """Write the facts as one JSON object, if a machine asked for it."""
         if self._machine:
-            sys.stdout.write(json.dumps({key: _plain(value) for key, value in self.facts.items()}) + "\n")
+            sys.stdout.write(json.dumps(plain_numbers(self.facts)) + "\n")
             sys.stdout.flush()
 
 
@@ -216,19 +217,6 @@ def _processor_seconds() -> float:
     """Time of the processor in this thread and in child processes that have ended [s]."""
     ended = resource.getrusage(resource.RUSAGE_CHILDREN)
     return thread_time() + ended.ru_utime + ended.ru_stime
-
-
-def _plain(value: Any) -> Any:
-    """JSON knows neither infinities nor numpy's numbers, however deep they stand."""
-    if isinstance(value, dict):
-        return {key: _plain(entry) for key, entry in value.items()}
-    if isinstance(value, list | tuple):
-        return [_plain(entry) for entry in value]
-    if hasattr(value, "item"):
-        value = value.item()
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    return value
 
 
 @contextmanager
