@@ -84,15 +84,12 @@ def test_examples_are_commands_as_they_are(line):
     assert scenario is None or scenario in TYPED
 
 
-@pytest.mark.parametrize(
-    ("shell", "word"), [("bash", "complete -o"), ("zsh", "#compdef coop-drake"), ("fish", "complete")]
-)
-def test_a_completion_script_for_every_usual_shell(shell, word):
-    environment = {**os.environ, "_COOP_DRAKE_COMPLETE": f"source_{shell}"}
+def test_a_shell_gets_a_completion_script():
+    environment = {**os.environ, "_COOP_DRAKE_COMPLETE": "source_bash"}
     program = "from coop_drake.cli import main; import sys; sys.argv = ['coop-drake']; main()"
     command = [sys.executable, "-c", program]
     done = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
-    assert word in done.stdout
+    assert "complete -o" in done.stdout
     assert "coop-drake" in done.stdout
 
 

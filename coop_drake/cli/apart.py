@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -59,24 +60,33 @@ apart_app = typer.Typer(
 )
 """The command with those below it."""
 
-Addresses = Annotated[
-    Path,
-    typer.Option("--addresses", metavar="FILE", help="Address book, the same for all; see `apart keys`."),
-]
-OwnKey = Annotated[
-    Path | None,
-    typer.Option(
-        "--key", metavar="FILE", help="This process' private key; that beside the address book by default."
-    ),
-]
-PlanFile = Annotated[
-    Path | None,
-    typer.Option(
-        "--plan",
-        metavar="FILE",
-        help="The plan, the same for all; plan.json in the scenario's results by default.",
-    ),
-]
+
+@dataclass(frozen=True)
+class NodeOptions:
+    """Options of the processes of a team: what all of them must have in common, and the key of each."""
+
+    addresses: Annotated[
+        Path,
+        typer.Option("--addresses", metavar="FILE", help="Address book, the same for all; see `apart keys`."),
+    ] = _ADDRESSES
+    key: Annotated[
+        Path | None,
+        typer.Option(
+            "--key",
+            metavar="FILE",
+            help="This process' private key; that beside the address book by default.",
+        ),
+    ] = None
+    plan: Annotated[
+        Path | None,
+        typer.Option(
+            "--plan",
+            metavar="FILE",
+            help="The plan, the same for all; plan.json in the scenario's results by default.",
+        ),
+    ] = None
+    gains: GainsName = None
+    faults: FaultsFile = None
 
 
 @apart_app.command("keys")
@@ -116,21 +126,13 @@ def keys_command(
 
 @apart_app.command("supervisor")
 @command
-def supervisor_command(
-    reporter: Reporter,
-    scenario: ScenarioPath,
-    addresses: Addresses = _ADDRESSES,
-    key: OwnKey = None,
-    plan: PlanFile = None,
-    gains: GainsName = None,
-    faults: FaultsFile = None,
-) -> None:
+def supervisor_command(reporter: Reporter, scenario: ScenarioPath, node: NodeOptions) -> None:
     """Be the supervisor of a team, until the world says that the run is over."""
     from coop_drake.apart import run_node
     from coop_drake.apart.messages import SUPERVISOR
 
-    task, found = _problem_of(scenario, gains, plan, reporter)
-    network = _network_of(task, found, addresses, key, faults, SUPERVISOR)
+    task, found = _problem_of(scenario, node, reporter)
+    network = _network_of(task, found, node, SUPERVISOR)
     reporter.say("The supervisor looks for the world and waits for all robots")
     outcome = run_node(task.scenario, found, (), SUPERVISOR, network)
     reporter.facts.update(outcome=outcome)
@@ -143,20 +145,16 @@ def robot_command(
     reporter: Reporter,
     scenario: ScenarioPath,
     robot: Annotated[int, typer.Argument(metavar="K", min=0, help="Which robot, counted from 0.")],
-    addresses: Addresses = _ADDRESSES,
-    key: OwnKey = None,
-    plan: PlanFile = None,
-    gains: GainsName = None,
-    faults: FaultsFile = None,
+    node: NodeOptions,
 ) -> None:
     """Be one robot of a team, until the world says that the run is over."""
     from coop_drake.apart import robots_of, run_node
 
-    task, found = _problem_of(scenario, gains, plan, reporter)
+    task, found = _problem_of(scenario, node, reporter)
     robots = robots_of(task.scenario)
     if robot >= robots:
         raise typer.BadParameter(f"K = {robot}: the team has robots 0 to {robots - 1}.")
-    network = _network_of(task, found, addresses, key, faults, robot)
+    network = _network_of(task, found, node, robot)
     maps = map_cells(task, found, reporter)
     reporter.say(f"Robot {robot} looks for the world and the supervisor")
     outcome = run_node(task.scenario, found, maps, robot, network)
@@ -169,24 +167,20 @@ def robot_command(
 def world_command(
     reporter: Reporter,
     scenario: ScenarioPath,
-    addresses: Addresses = _ADDRESSES,
-    key: OwnKey = None,
-    plan: PlanFile = None,
     out: ResultsFolder = None,
-    gains: GainsName = None,
-    faults: FaultsFile = None,
     free_running: FreeRunning = False,
     rejoin: Rejoin = REJOIN,
     *,
+    node: NodeOptions,
     options: RunOptions,
 ) -> None:
     """Simulate and record a team whose robots and supervisor are processes of their own."""
     from coop_drake.apart import run_world, wall_clock
     from coop_drake.apart.messages import WORLD
 
-    task, found = _problem_of(scenario, gains, plan, reporter)
+    task, found = _problem_of(scenario, node, reporter)
     folder = ResultFolder.of(task.name, out, "simulation")
-    network = _network_of(task, found, addresses, key, faults, WORLD)
+    network = _network_of(task, found, node, WORLD)
     pacing = wall_clock(task.scenario) if free_running else None
     reporter.say("The world waits for the supervisor and all robots")
 
@@ -198,9 +192,7 @@ def world_command(
         reporter.code = carry_out(task, found, folder, reporter, drawing, world, options)
 
 
-def _problem_of(
-    scenario: Path, gains: str | None, plan: Path | None, reporter: Reporter
-) -> tuple[Task, Plan]:
+def _problem_of(scenario: Path, node: NodeOptions, reporter: Reporter) -> tuple[Task, Plan]:
     """Read scenario and plan.
 
     Raises:
@@ -209,14 +201,12 @@ def _problem_of(
     """
     from coop_drake.diagram import control_period
 
-    task = read_task(scenario, gains, reporter)
+    task = read_task(scenario, node.gains, reporter)
     control_period(task.scenario)
-    return task, read_plan(task, plan or ResultFolder.of(task.name, None).plan, reporter)
+    return task, read_plan(task, node.plan or ResultFolder.of(task.name, None).plan, reporter)
 
 
-def _network_of(
-    task: Task, plan: Plan, addresses: Path, key: Path | None, faults: Path | None, index: int
-) -> Network:
+def _network_of(task: Task, plan: Plan, node: NodeOptions, index: int) -> Network:
     """Read the address book, the private key of a process by its index in messages, and faults.
 
     Raises:
@@ -225,7 +215,7 @@ def _network_of(
     from coop_drake.apart import network_of, robots_of
     from coop_drake.apart.team_files import key_file, load_address_book, load_own_keys
 
-    book = load_address_book(addresses, robots_of(task.scenario))
-    beside = addresses.parent / key_file(index)
-    keys = load_own_keys(book, index, key or (beside if beside.exists() else None))
-    return network_of(task.scenario, plan, book, keys, faults_of(task, faults))
+    book = load_address_book(node.addresses, robots_of(task.scenario))
+    beside = node.addresses.parent / key_file(index)
+    keys = load_own_keys(book, index, node.key or (beside if beside.exists() else None))
+    return network_of(task.scenario, plan, book, keys, faults_of(task, node.faults))

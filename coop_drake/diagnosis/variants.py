@@ -210,59 +210,41 @@ def bracketed(
         refuted: Amount that is proved not to be enough beforehand, None if nothing is.
         improve: Given an amount that is enough and its outcome, looks for a smaller one.
     """
-    search = _Bracketing(ask, improve, refuted)
+    found: float | None = None
+    outcome: Outcome | None = None
+    missed = 0.0  # Largest amount without a channel, proved or not.
+    unproved = 0.0  # Smallest amount without a channel and without a proof, 0 if there is none.
+    most, asked = 0.0, 0
+
+    def step(amount: float) -> bool:
+        """Ask about one amount; returns whether a channel was found."""
+        nonlocal found, outcome, missed, unproved, most, asked, refuted
+        asked, most = asked + 1, max(most, amount)
+        here = ask(amount)
+        if here.answer is Answer.FOUND:
+            found, outcome = improve(amount, here)
+            missed, unproved = min(missed, found), min(unproved, found)
+            return True
+        missed = max(missed, amount)
+        if here.answer is Answer.INFEASIBLE:
+            refuted = max(amount, refuted or 0.0)
+            unproved = unproved if unproved > amount else 0.0
+        else:
+            unproved = min(unproved or amount, amount)
+        return False
+
     amount = min(amounts.first, amounts.most)
-    while not search.step(amount) and amount < amounts.most and search.asked < amounts.asked:
+    while not step(amount) and amount < amounts.most and asked < amounts.asked:
         amount = min(2.0 * amount, amounts.most)
-    while search.found is not None and search.asked < amounts.asked:
-        wanted = max(amounts.resolution, amounts.fraction * search.found)
-        if search.found - search.missed > wanted:
-            search.step(0.5 * (search.found + search.missed))
-        elif search.unproved - search.proved > wanted:
-            search.step(0.5 * (search.unproved + search.proved))
+    while found is not None and asked < amounts.asked:
+        wanted, proved = max(amounts.resolution, amounts.fraction * found), refuted or 0.0
+        if found - missed > wanted:
+            step(0.5 * (found + missed))
+        elif unproved - proved > wanted:
+            step(0.5 * (unproved + proved))
         else:
             break
-    return Bracket(search.refuted, search.found, search.most, search.outcome)
-
-
-class _Bracketing:
-    """The amounts asked so far."""
-
-    def __init__(
-        self,
-        ask: Callable[[float], Outcome],
-        improve: Callable[[float, Outcome], tuple[float, Outcome]],
-        refuted: float | None,
-    ) -> None:
-        self._ask, self._improve = ask, improve
-        self.refuted = refuted
-        self.found: float | None = None
-        self.outcome: Outcome | None = None
-        self.missed = 0.0  # Largest amount without a channel, proved or not.
-        self.unproved = 0.0  # Smallest amount without a channel and without a proof, 0 if there is none.
-        self.most, self.asked = 0.0, 0
-
-    @property
-    def proved(self) -> float:
-        """Largest amount that is proved not to be enough, 0 if there is none."""
-        return self.refuted or 0.0
-
-    def step(self, amount: float) -> bool:
-        """Ask about one amount; returns whether a channel was found."""
-        self.asked += 1
-        self.most = max(self.most, amount)
-        outcome = self._ask(amount)
-        if outcome.answer is Answer.FOUND:
-            self.found, self.outcome = self._improve(amount, outcome)
-            self.missed, self.unproved = min(self.missed, self.found), min(self.unproved, self.found)
-            return True
-        self.missed = max(self.missed, amount)
-        if outcome.answer is Answer.INFEASIBLE:
-            self.refuted = max(amount, self.proved)
-            self.unproved = self.unproved if self.unproved > amount else 0.0
-        else:
-            self.unproved = min(self.unproved or amount, amount)
-        return False
+    return Bracket(refuted, found, most, outcome)
 
 
 # Whether the team blocks itself: the problem without walls, and with pairs of bodies that may overlap.

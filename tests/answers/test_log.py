@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from coop_drake.answers.log import SimulationLog
-from coop_drake.errors import PlanError
 
 ROWS, ROBOTS, JOINTS = 5, 2, 3
 SIZES = {"N": ROBOTS, "n": JOINTS, "1 + n": 1 + JOINTS, "3 + n": 3 + JOINTS}
@@ -46,26 +45,3 @@ def test_a_violation_survives_its_file(log, tmp_path):
     again = SimulationLog.load(path)
     assert again.reached is False
     assert again.violation == "workspace clearance -0.01 m at t = 2 s"
-
-
-def test_an_interrupted_write_leaves_the_old_file(log, tmp_path, monkeypatch):
-    path = tmp_path / "log.npz"
-    log.save(path)
-    before = path.read_bytes()
-
-    def interrupt(stream, **_):
-        stream.write(b"half")
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr(np, "savez_compressed", interrupt)
-    with pytest.raises(KeyboardInterrupt):
-        log.save(path)
-    assert path.read_bytes() == before
-    assert [entry.name for entry in tmp_path.iterdir()] == ["log.npz"]
-
-
-def test_a_file_that_is_no_log_is_refused_by_name(tmp_path):
-    path = tmp_path / "other.npz"
-    np.savez(path, times=np.zeros(3))
-    with pytest.raises(PlanError, match=r"other\.npz: not a simulation log; it lacks cell_index, "):
-        SimulationLog.load(path)

@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import json
 import tracemalloc
-from math import inf, nan
 
-import numpy as np
 import pytest
 import yaml
 from typer.testing import CliRunner
@@ -16,7 +13,6 @@ from coop_drake.campaign.file import load_campaign
 from coop_drake.campaign.plans import Plans
 from coop_drake.campaign.runs import RunMaker
 from coop_drake.campaign.variation import Variation
-from coop_drake.cli.reporter import Reporter
 from tests.support.cli import invoke
 from tests.support.scenarios import write_scenario
 
@@ -220,11 +216,3 @@ def test_a_large_grid_takes_no_memory(tmp_path):
     assert list(values) == list(grid)
     assert [round(1e5 * value) for value in values.values()] == [5, 999, 3, 17]
     assert variation.count == 2 * 7 * 1000 * 900 * 1100
-
-
-def test_what_is_not_finite_is_null_at_any_depth(capsys):
-    reporter = Reporter(machine=True, quiet=True)
-    reporter.facts["rows"] = [{"least": nan, "all": (inf, np.float64(1.5))}, [-inf]]
-    reporter.close()
-    said = json.loads(capsys.readouterr().out, parse_constant=pytest.fail)
-    assert said == {"rows": [{"least": None, "all": [None, 1.5]}, [None]]}

@@ -55,14 +55,3 @@ def test_plan_points_to_why(blocked, tmp_path):
     result = invoke("plan", blocked, "--out", tmp_path / "out")
     assert result.exit_code == 3
     assert f"coop-drake why {blocked}" in result.output.replace("\n", "")
-
-
-def test_bad_input_is_answered_like_everywhere(tmp_path):
-    missing = invoke("why", tmp_path / "nowhere.yaml", "--json")
-    assert missing.exit_code == 2
-    assert "nowhere.yaml" in json.loads(missing.stdout)["error"]
-    path = write_scenario(tmp_path / "wrong.scenario.yaml", planner={"margin": "wide"})
-    wrong = invoke("why", path, "--json", "--out", tmp_path / "out")
-    assert wrong.exit_code == 2
-    assert "planner.margin" in json.loads(wrong.stdout)["key"]
-    assert not (tmp_path / "out").exists()
