@@ -57,8 +57,8 @@ class Hello(Message, frozen=True):
     Attributes:
         protocol: Version of the protocol.
         sender: Index of the process.
-        scenario: Digest of the scenario; both ends must have the same.
-        plan: The same of the plan.
+        scenario: Digest of the scenario, the same in all processes.
+        plan: Likewise of the plan.
     """
 
     protocol: Number
@@ -97,11 +97,10 @@ class Sample(Message, frozen=True):
     Attributes:
         number: Number of the sample.
         time: What the robot's clock shows at the sample.
-        step: Whether the robot updates its state now, after it has shown its outputs for the log; else it
-            only shows them.
-        stopped: Whether the line of the emergency stop is open, so that the drives of all robots brake.
-        team_messages: In lock-step, the robot computes once it has so many messages of the supervisor in
-            their session.
+        step: Whether the robot computes an effort; if not, it only shows what it would log.
+        stopped: Whether the line of the emergency stop is open, so that all drives brake.
+        team_messages: How many messages of the supervisor in their session the robot must have before it
+            answers.
         pose_stamp: When the pose was measured, in the world's time; not when it was sent.
         state_stamp: When the state was measured, likewise.
         object_pose: Pose (x, y, angle) of the object's frame L in W, the angle in any turn.
@@ -124,11 +123,11 @@ class Tick(Message, frozen=True):
     """The same for the supervisor, which measures nothing.
 
     Attributes:
-        number: Number of the sample.
-        time: Simulated time.
-        step: Whether the supervisor updates its state now; it shows its outputs as they were before.
-        stopped: Whether the line of the emergency stop is open, so that the drives of all robots brake.
-        team_messages: In lock-step, it decides once it has so many messages of each robot in their session.
+        number: As in ``Sample``.
+        time: Time of the sample.
+        step: Whether the supervisor decides; if not, it only shows what it would log.
+        stopped: As in ``Sample``.
+        team_messages: How many messages of each robot it must have before it answers.
     """
 
     number: Number
@@ -145,13 +144,13 @@ class Effort(Message, frozen=True):
         number: Number of the sample that it was computed from.
         stamp: The older of the stamps of the measurements that it rests on.
         team_messages: How many messages this robot has sent to the supervisor in this session.
-        state: State of the process: 0: it follows the plan; 1: it holds; 2: its drives brake, and it waits to
-            begin its cell anew; 3: it does not know the current cell; 4: it rests where it cannot begin its
-            cell anew; 5: it returns slowly to its cell, on a way that no plan has proved free; 6: its
-            measurements are older than the plan allows, or have stamps that cannot be.
-        efforts: Base wrench and joint torques, shape (3 + n_k,).
-        rest: Where the drives bring the robot to rest when the line is opened, its own z_k, shape (3 + n_k,);
-            empty where it follows no nominal motion.
+        state: 0: the robot follows the plan; 1: it holds; 2: its drives brake, and it waits to begin its cell
+            anew; 3: it does not know the current cell; 4: it rests where it cannot begin its cell anew; 5: it
+            returns slowly to its cell, on a way that no plan has proved free; 6: its measurements are older
+            than the plan allows, or have stamps that cannot be.
+        efforts: Base wrench and joint efforts, shape (3 + n_k,).
+        rest: Where drives that brake bring the robot to rest, its own z_k, shape (3 + n_k,); empty where it
+            follows no nominal motion.
     """
 
     number: Number
@@ -166,12 +165,12 @@ class Telemetry(Message, frozen=True):
     """What one robot shows to the log alone.
 
     Attributes:
-        number: Number of the sample.
-        time: Simulated time.
+        number: As in the question.
+        time: As in the question.
         team_messages: As in ``Effort``.
         state: As in ``Effort``.
         refused: How many messages this process has refused.
-        values: In the order of the robot's outputs for the log.
+        values: What it logs, see below.
     """
 
     number: Number
@@ -186,16 +185,17 @@ class Status(Message, frozen=True):
     """What the supervisor shows to the log alone.
 
     Attributes:
-        number: Number of the sample.
-        time: Simulated time.
-        knows: Whether it knows the current cell; a supervisor that was started again first learns it from
-            the robots.
+        number: As in the question.
+        time: As in the question.
+        knows: Whether it knows the current cell; a supervisor that was started again does not at first.
         team_messages: How many messages it has sent to each robot in their session.
         cell: Index of the current cell.
-        entry: Simulated time at which it was entered.
-        arrived: Whether all robots are ready to leave the last cell.
-        causes: Why the team is held, as the block ``hold_supervisor`` shows it: the order, then each robot.
-        refused: How many messages the supervisor has refused.
+        entry: Time at which this cell was entered.
+        arrived: Whether all robots have said that they have arrived in the last cell.
+        causes: Why the team is held, by an order (1), then for each robot: 0: no cause; 2: it asks; 3: it is
+            not heard; 4: its drives shall brake. Empty where neither the scenario has holds nor the plan a
+            budget.
+        refused: How many messages it has refused.
     """
 
     number: Number
@@ -399,11 +399,11 @@ class Reason(Enum):
 
     MALFORMED = "not as this page says, or a message that its sender may not send here"
     VERSION = "a Hello of another version of the protocol"
-    SENDER = "a Hello of an unknown process, or not of the one whose key it is"
+    SENDER = "a Hello of an unknown process, or with the key of another one"
     SESSION = "no session: before Hello was answered, or of another connection"
     SEQUENCE = "its number has been passed: repeated or late"
     VALUE = "an answer that does not fit its question"
-    STAMP = "an effort that rests on older measurements than drives may use, or on ones of the future"
+    STAMP = "an effort that rests on measurements that are too old, or of the future"
     FLOOD = "more messages of one sender than a team has between two samples"
     HANDSHAKE = "a connection that does not speak ZeroMQ, or has no allowed key"
 

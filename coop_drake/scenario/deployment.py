@@ -141,11 +141,10 @@ class Measurements:
         position_noise: Standard deviation of every measured position [m].
         angle_noise: Standard deviation of measured angles and joint positions [rad or m].
         rate_noise: Standard deviation of measured rates [m/s or rad/s].
-        delay: Age of a measurement when the controller gets it, rounded up to control periods [s].
-        loss: Probability that a measurement is lost and the last one is used again; of the pose and of the
-            robot's own state separately [-].
+        delay: Age of a measurement when the controller gets it [s].
+        loss: Probability that a measurement, pose or own state, is lost and the last one is used again [-].
         late: Probability that a measurement arrives late; it is used unless a newer one has arrived [-].
-        late_by: Delay of a late measurement, rounded up to control periods [s].
+        late_by: Delay of a late measurement [s].
         waves: Bounded errors that change their sign.
     """
 
@@ -183,7 +182,7 @@ class Messages:
     Attributes:
         loss: Probability that a report is lost [-].
         repeat: Probability that a report arrives twice, one delay apart [-].
-        delay: Time that a report travels, rounded up to control periods [s].
+        delay: Time that a report travels [s].
     """
 
     loss: Probability = 0.0
@@ -208,7 +207,7 @@ class PoseBias:
 
 @dataclass(frozen=True)
 class Silence:
-    """A robot that sends no reports for a while; its motors may fail with it. Needs a control rate.
+    """A robot that sends no reports for a while; its motors may fail with it.
 
     Attributes:
         begin: When it falls silent [s].
@@ -224,7 +223,7 @@ class Silence:
 
 @dataclass(frozen=True)
 class Deafness:
-    """A robot that hears nothing of the hold supervisor for a while. Needs a control rate.
+    """A robot that hears nothing of the hold supervisor for a while.
 
     Attributes:
         begin: When it hears nothing any more [s].
@@ -275,11 +274,9 @@ class RobotDepartures:
     Attributes:
         pose_bias: Constant error of the object's measured pose.
         odometry_scale: By how much it overestimates the rates of its base, relative [-].
-        sample_offset: By how much later than the others it measures and computes, less than a period; needs a
-            control rate [s].
+        sample_offset: By how much later than the others it measures and computes, less than a period [s].
         clock_error: By how much its clock is ahead of the others' [s].
-        switch_delay: How much later than the others it hears of a new cell, rounded up to control periods;
-            needs a control rate [s].
+        switch_delay: How much later than the others it hears of a new cell [s].
         silence: When it sends no reports, null for never.
         deaf: When it hears nothing of the hold supervisor, null for never.
         blocked: When the wheels of its base are blocked, null for never.
@@ -322,8 +319,7 @@ class JointFriction:
     """Friction of every joint, beside the damping that its model has.
 
     Attributes:
-        coulomb: Friction whatever the rate; a joint at rest is held by up to as much [N m, or N for a joint
-            that slides].
+        coulomb: Friction whatever the rate; a joint at rest is held by up to as much [N m or N].
         viscous: Friction for each unit of the rate [N m s or N s/m].
     """
 
@@ -375,19 +371,21 @@ class Deployment:
         preset: The departures of a usual team, which the keys beside it replace one by one. ``mobile_base``:
             200 Hz, measurements 10 ms late with noise of 1 mm, 0.5 mrad and 0.01 /s, masses believed 20 % too
             large, base forces up to 650 N, actuators that lag by 5 ms, a fifth of the reports lost.
-        control_rate: How often controllers compute a new effort; null for continuous time [Hz].
+        control_rate: How often controllers compute a new effort; null for continuous time, which excludes
+            noise, delays, losses, silence, wrong clocks and budgets. Delays are rounded up to whole periods
+            [Hz].
         mass_error: By how much robots overestimate all masses and inertias, relative [-].
-        measurements: Noise and delay of what robots measure; needs a control rate.
+        measurements: Noise and delay of what robots measure.
         actuators: Largest efforts of the actuators.
-        messages: Losses and delay of ready reports; needs a control rate.
+        messages: Losses and delay of ready reports.
         robots: What is wrong with single robots, by name; ``"*"`` for all without an entry.
         floor: Friction and slope of the floor.
         joint_friction: Friction of every joint, which no robot knows of.
         pushes: Forces from outside.
         start_offset: How far the team stands off the plan's start.
-        clock_error: Largest error of the time at which robots believe to measure; needs a control rate [s].
+        clock_error: Largest error of the time at which robots believe to measure [s].
         budget: Under which budget of these departures a plan must hold: ``position`` for the object's
-            position alone, ``all`` for angles and joints, too; needs a control rate.
+            position alone, ``all`` for angles and joints, too.
         seed: Seed of noise and losses.
     """
 

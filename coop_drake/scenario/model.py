@@ -252,7 +252,7 @@ class Hold:
         energy: A robot asks for a hold when the energy of an axis is above so many times the bound with which
             its cell may be entered, or its Delta E is negative; null for never [-].
         silence: The team is held when a robot was not heard for so long; a robot that has heard nothing of
-            the supervisor for so long holds by itself. Null to wait for ever; needs a control rate [s].
+            the supervisor for so long holds by itself. Null to wait for ever [s].
     """
 
     at: tuple[NotNegative, ...] = ()

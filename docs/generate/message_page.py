@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import re
 from typing import Any
 
 import msgspec
@@ -51,7 +52,7 @@ _SECTIONS = (
     ),
     (
         "The team's messages",
-        "All that crosses between robots. Reports and switches are sent only when they change.",
+        "All that crosses between robots and supervisor. A world does not see it.",
         {"the robot": KINDS["robot", "supervisor"], "the supervisor": KINDS["supervisor", "robot"]},
     ),
 )
@@ -60,9 +61,8 @@ _EXAMPLE = encode(7, 1, Ready(3, ready=True)).hex(" ")
 
 _TOP = f"""# Messages between processes
 
-What a world in another language needs to know. What each field means stands with the types by which
-messages are checked, in `messages.py` of [apart](../../coop_drake/apart). [Processes of their
-own](../how_to/apart.md) says how to start them. `python -m docs.generate` makes this page.
+What a world in another language needs to know. [Processes of their own](../how_to/apart.md) says how to
+start the others. `python -m docs.generate` makes this page from the types by which messages are checked.
 
 ## Bytes
 
@@ -72,9 +72,9 @@ first numbered message of session 7, about cell 3, is `[7, 1, {{"type": "Ready",
 true}}]`, in bytes `{_EXAMPLE}`.
 
 All fields must be there, and no others. Integers have no sign and at most 32 bits. Real numbers are finite
-where the type is not "any real"; whole ones may be sent as integers. Lists have at most {MOST_ITEMS} items,
-a message at most {LONGEST} bytes. A process has an index: k for robot k, of at most {MOST_ROBOTS},
-{SUPERVISOR} for the supervisor and {WORLD} for the world.
+where the type is not "any real"; whole ones may be sent as integers. Types in the plural are lists of at
+most {MOST_ITEMS} items. A message has at most {LONGEST} bytes. A process has an index: k for robot k of at
+most {MOST_ROBOTS}, {SUPERVISOR} for the supervisor and {WORLD} for the world.
 
 ## Connections and sessions
 
@@ -83,13 +83,12 @@ book](../how_to/apart.md#addresses-and-keys). Robots connect to both, the superv
 a `DEALER` socket, and with the CURVE keys of the book if there are any.
 
 1. The process that connects draws a number for the session. It sends `Hello` with it every tenth of a second
-   until there is a session.
-2. The answer is `Welcome`, or `Refused` with a reason, after which the process may ask again. Messages of
-   another session are refused.
-3. Each end numbers its messages from 1 on. A number that is not larger than the one before is refused.
-4. The session ends with its connection. Until then no other connection gets the name. ZeroMQ closes a
+   until the answer is `Welcome`. After `Refused` with a reason it may ask again.
+2. Each end numbers its messages from 1 on. Refused are messages of another session, and numbers that are not
+   larger than the one before.
+3. The session ends with its connection. Until then no other connection gets the name. ZeroMQ closes a
    connection at once when its process has ended, or after two seconds without a sign of life.
-5. The list of three, `Hello` with `protocol` and `Refused` with `reason` are the same in all versions of the
+4. The list of three, `Hello` with `protocol` and `Refused` with `reason` are the same in all versions of the
    protocol. This page is about version {PROTOCOL}.
 """
 
@@ -100,24 +99,31 @@ def message_page() -> str:
     for title, about, senders in _SECTIONS:
         shown = dict.fromkeys((sender, cls) for sender, kinds in senders.items() for cls in kinds)
         parts += [f"## {title}", "", about, ""]
-        parts += [_line(cls, sender) for sender, cls in shown if cls is not Goodbye or title == "Sessions"]
+        shown = {(sender, cls): None for sender, cls in shown if cls is not Goodbye or title == "Sessions"}
+        parts += [_line(cls, sender, to_world=title != _SECTIONS[-1][0]) for sender, cls in shown]
         parts += [""]
     return "\n".join([*parts, _world(), _reasons()]).replace("``", "`")
 
 
-def _line(cls: Any, sender: str) -> str:
-    """Return the line of one message: who sends it, what it says, and its fields."""
-    about = " ".join((inspect.getdoc(cls) or "").split("\n\n")[0].split())
+def _line(cls: Any, sender: str, *, to_world: bool) -> str:
+    """Return the line of one message: who sends it, and what it says; its fields, for a world in lines."""
+    about, *more = (inspect.getdoc(cls) or "").split("\n\n")
+    parts = re.split(r"^ {4}(\w+): ", more[-1], flags=re.MULTILINE) if more else []
+    meanings = dict(zip(parts[1::2], parts[2::2], strict=True))
     described: Any = msgspec.inspect.type_info(cls)
-    fields = ", ".join(f"`{field.name}` ({_type(field.type)})" for field in described.fields)
-    return f"- **{cls.__name__}**, from {sender}: {about}" + (f" Fields: {fields}." if fields else "")
+    said = f"- **{cls.__name__}**, from {sender}: {' '.join(about.split())}"
+    fields = {field.name: f"`{field.name}` ({_type(field.type)})" for field in described.fields}
+    if not to_world:
+        return said
+    explained = (f"    - {field}: {' '.join(meanings[name].split())}" for name, field in fields.items())
+    return "\n".join([said, *explained])
 
 
 def _type(kind: Any) -> str:
     """Return the type of a field in a word, with its unit."""
-    words: dict[Any, str] = {IntType: "integer", FloatType: "real", BoolType: "truth value", StrType: "text"}
+    words: dict[Any, str] = {IntType: "integer", FloatType: "real", BoolType: "boolean", StrType: "text"}
     if isinstance(kind, VarTupleType):
-        return f"list of {_type(kind.item_type)}s"
+        return f"{_type(kind.item_type)}s"
     if isinstance(kind, Metadata):
         return _type(kind.type) + (f" [{kind.extra['unit']}]" if kind.extra else "")
     return "any " * (isinstance(kind, FloatType) and kind.le is None) + words[type(kind)]
@@ -131,29 +137,29 @@ def _world() -> str:
     return f"""## Building a world
 
 A world listens to all robots and the supervisor, sends `Sample` and `Tick`, and hears `Effort`, `Telemetry`
-and `Status`. It ends the run by `Goodbye`.
+and `Status`. It ends the run by `Goodbye`, for example after `arrived`.
 
 - **Samples** are numbered from 0, one for every control period. At sample 0 the team rests at the plan's
-  start. A process whose first question has another number asks for its cell with `Place`. Questions with
-  `step` false change nothing, and ask for telemetry alone.
-- **Time** is the world's. `time` is what the robot's clock shows at the sample. In lock-step the world waits
-  for all answers; by the wall clock a sample is sent no earlier than at its time.
-- **Order**: a message of the team counts from the next sample on. Every answer says how many messages its
-  sender has sent to the team. The next question says in `team_messages` how many messages its
-  receiver must have before it answers. In a `Sample` this is the number that the last `Status` had for this
-  robot. In a `Tick` these are the numbers of the last `Telemetry` of each robot. Before the first answer it
-  is 0.
-- **Stamps** are the times, by the robot's clock, at which pose and state were measured: m periods before
-  `time` for a delay of m periods, 0 in the first m samples. Under a budget a robot asks for a hold, and
-  after {LONGEST_DOUBT:g} s lets its drives brake, if a measurement's age is wrong by more than
-  `clock_error`, if pose and state are of different instants, if a stamp goes back, or if a clock jumps.
-  Drives take no effort whose `stamp` is in the future of its sample, or older by more than {TOLERATED:g} s
-  than the budget's delay and twice its `clock_error`.
+  start. To a question with `step` a robot answers by `Effort`, then by `Telemetry`, without it by
+  `Telemetry` alone; the supervisor always answers by `Status`. Questions without `step` change nothing. A
+  process whose first question has a number above 0 was started again: it asks for its cell with `Place`.
+- **Time** is the world's. A robot with a wrong clock is told a wrong `time`. In lock-step the world waits for
+  all answers; by the wall clock a sample is sent no earlier than at its time.
+- **Order**: a message of the team counts from the next sample on. So every answer says in `team_messages` how
+  many messages its sender has sent to the team, and the world hands this on: to a robot in its next `Sample`
+  the number that the last `Status` had for it, to the supervisor in its next `Tick` the numbers of the last
+  `Telemetry` of each robot. Before the first answer it is 0.
+- **Stamps** lie m periods before `time` for a delay of m periods, and are 0 in the first m samples. Under a
+  budget a robot asks for a hold, and after {LONGEST_DOUBT:g} s lets its drives brake, if the age of a
+  measurement is wrong by more than `clock_error`, if pose and state are of different instants, if a stamp
+  goes back, or if a clock jumps. Drives take no effort whose `stamp` is in the future of its sample, or older
+  by more than {TOLERATED:g} s than the budget's delay and twice its `clock_error`.
 - **Efforts** act on the base at the origin of Bk as (force along x of W, force along y of W, torque about
   z), then on the joints in the order of q_k. They hold from the sample's time on until the next ones.
 - **Signs of life**: the world may send `Welcome` at any time. A process ends when it has heard nothing for
   30 s.
-- **Telemetry** has these values in their order, here for one joint, with the numbers of values: {shown}.
+- **Digests** are compared as texts. A world that does not know them takes those of the first `Hello`.
+- **Telemetry** has these `values` in their order, with their numbers for a robot with one joint: {shown}.
   `clock` is there in teams that can be held, `alarm` under a budget; `funnels` has the lower, then the upper
   bounds of (theta, q_k).
 - **Braking**, where `stopped` is true or no effort comes in time: effort = -D (z' + {RETURN_RATE:g} /s (z -
@@ -169,7 +175,7 @@ and `Status`. It ends the run by `Goodbye`.
 def _reasons() -> str:
     return f"""## What is refused
 
-A message that departs from this page is refused and counted under one of these reasons. The
-process says on standard error what is wrong with the first malformed one.
+A message that departs from this page is refused and counted by its reason. The process says on
+standard error what is wrong with the first malformed one.
 
 {"".join(f"- **{reason.name.lower()}**: {reason.value}{chr(10)}" for reason in Reason)}"""

@@ -18,17 +18,17 @@ from coop_drake.typed_data import FieldType, classes_by_tag, describe, field_typ
 _TOP = """# Scenario files
 
 A scenario is one YAML file that ends in `.scenario.yaml`. [How to write one](../how_to/own_scenario.md) shows
-a small one. Every section has a heading here; `workspace`, `directives`, `start` and `goal` are required. In
-brackets stand the unit, what a key may be, and its default. Any other key is refused. Lengths are metres,
-angles radians, frames those of the [conventions](../conventions.md). `make docs` makes this page from the
-classes that hold the values.
+a small one. `workspace`, `directives`, `start` and `goal` are required; keys that are not here are refused.
+In brackets stand the unit, what a key may be (a number, or true or false, if nothing is said), and its
+default; a key with the default `null` may be null. Frames are those of the [conventions](../conventions.md).
+`make docs` makes this page from the classes that hold the values.
 """
 
 _CAMPAIGN = """# Campaign files
 
 A campaign is one YAML file that ends in `.campaign.yaml`; [how to run one](../how_to/campaign.md). In
-brackets stand the unit, what a key may be, and its default. `make docs` makes this page from the classes that
-hold the values.
+brackets stand the unit, what a key may be, and its default; a key with the default `null` may be null.
+`make docs` makes this page from the classes that hold the values.
 """
 
 
@@ -80,7 +80,9 @@ def _lists(found: Iterable[Section]) -> Iterator[str]:
 
 def _entry(key: ScenarioKey) -> str:
     """Return the line of one key: its name; in brackets unit, type and limits, default; its meaning."""
-    facts = [key.unit.removeprefix("-"), _short(key.kind), f"`{key.default}`" if key.default else "required"]
+    kind = _short(key.kind).removesuffix(", or null" if key.default == "null" else "")
+    kind = "" if kind == "number" else kind
+    facts = [key.unit.removeprefix("-"), kind, f"`{key.default}`" if key.default else "required"]
     if key.default == "see below":
         facts = ["section"]
     return f"- `{key.name}` ({'; '.join(fact for fact in facts if fact)}): {key.meaning}"

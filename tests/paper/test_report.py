@@ -166,7 +166,7 @@ def test_the_markdown_says_the_same_and_its_pictures_are_there(material, report)
 
 
 def test_errata_are_those_of_the_documents_and_every_assumption_is_used(material):
-    in_documents = set(re.findall(r"^\| (E\w+) \|", (DOCS / "errata.md").read_text(), re.MULTILINE))
+    in_documents = set(re.findall(r"^- \*\*(E\w+)\*\*", (DOCS / "errata.md").read_text(), re.MULTILINE))
     assert set(ERRATA) <= in_documents
     used = {key for exhibit in exhibits(material) for key in exhibit.because}
     assert used <= set(ERRATA) | set(ASSUMPTIONS)
