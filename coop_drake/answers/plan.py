@@ -103,8 +103,8 @@ class Transition:
         gains: Gains of the governor and of the funnels.
         path: Such a path from where the cell is entered to the target, shape (k, 2) [m].
         tolerance: What follows from the plan's budget for the axes; null in a plan without one for them.
-        governed: Positions of Q_i that keep the distance of the plan's position tube from its boundary, to
-            which p_G and the object's nominal motion are kept; null in a plan without a tube [m].
+        governed: Region in which p_G and the object's nominal motion stay: the cell less a strip as wide as
+            the plan's position tube; null in a plan without a tube [m].
     """
 
     target: Vector

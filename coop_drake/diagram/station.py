@@ -181,8 +181,8 @@ class Outputs(NamedTuple):
     """Where in a row of ports the outputs stand of robots and supervisor, wherever these are computed.
 
     Attributes:
-        robots: Of every robot, by the names of ``robot_record``; those that it does not have are left out.
-        supervisor: By the names of ``supervisor_record``, likewise.
+        robots: For every robot the places of its outputs, by their names in ``robot_record``.
+        supervisor: The same for the supervisor, by the names in ``supervisor_record``.
         efforts: What the actuators of every robot give.
     """
 

@@ -81,7 +81,7 @@ class Wave:
 
     Attributes:
         size: Magnitude, in the unit of what is measured.
-        period: Time from one change to the positive error to the next [s].
+        period: Time after which the error repeats itself [s].
         phase: Share of a period that has passed at the start [-].
     """
 

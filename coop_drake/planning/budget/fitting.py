@@ -186,7 +186,7 @@ def _attempt(
     loop: AxisLoop,
     limited: LimitedEfforts | None,
 ) -> ProvedTransition | UnprovedTransition:
-    """Return what holds for transition k, entered from the one before or from rest; or what does not hold."""
+    """Return what is proved of transition k, entered from the one before or from rest, or what is not."""
     budget, T = loop.budget, loop.budget.period
     conditions = AxisConditions(T, budget.lag)
     if isinstance(before, ProvedTransition):
@@ -294,7 +294,7 @@ COMMAND_WEIGHTS = (0.0005, 0.004)
 loops, as an axis with little room needs them, and for soft ones, which take small efforts."""
 
 SLOWER = (1.0, 0.5, 0.25, 0.1)
-"""Shares of the usual rate and acceleration that are tried, where limits allow no more [-]."""
+"""Shares of the usual rate and acceleration that are tried one after the other [-]."""
 
 AGE_FACTORS = (1.0, 1.25, 1.6, 2.0, 2.3, 2.6, 3.0)
 """Gains are tried for so many times the age of what a nominal motion's commands rest on [-]: slow motions

@@ -201,7 +201,7 @@ def _tubes(
 def _narrowest_allowed(
     tubes: Sequence[PositionTube], problem: PlanningProblem, plan: Plan, most: float = inf
 ) -> PositionTube | UnprovedPosition:
-    """Return the narrowest tube that is allowed, as stiff loops take large forces; or why none is."""
+    """Return the narrowest tube that is allowed, or why none is; stiffer loops would take larger forces."""
     found = _not_allowed(tubes[0], problem, plan, most)
     allowed = (tube for tube in tubes if _not_allowed(tube, problem, plan, most) is None)
     return tubes[0] if found is None else next(allowed, found)

@@ -214,8 +214,8 @@ class GraphCell:
 class CellGraph:
     """Cells by slice, and an incremental search by Dijkstra's algorithm for the path of least total weight.
 
-    It finds what a new search would: of equally cheap ways to a cell the one whose last cell but one has the
-    least cost, and of these the lowest number.
+    It finds what a new search would. Ways to a cell may be equally cheap. Then it takes the way whose last
+    cell but one costs least, and among these the one with the lowest number.
 
     Args:
         slices: The subdivision that the cells belong to.

@@ -27,7 +27,7 @@ SAME_TIME = 1e-9
 """Times that differ by less are those of one instant [s]."""
 
 ROUNDING = 1e-9
-"""Distances that are computed twice may differ by so much [m, rad, and per second]."""
+"""By how much a distance or rate that is computed again may differ from the logged one [m, rad, 1/s]."""
 
 
 class Departure(NamedTuple):
