@@ -252,7 +252,7 @@ def _component(
 
 
 def _opened(room: BoolGrid, radius: float) -> BoolGrid:
-    """The cells of the room that discs inside the room cover (an opening); so walls only grow."""
+    """Return the cells that lie in a disc inside the room (a morphological opening): walls only grow."""
     centres = ndimage.distance_transform_edt(room) > radius
     return (ndimage.distance_transform_edt(~centres) <= radius) & room
 

@@ -211,9 +211,9 @@ class SampledSearch:
     ) -> BoxSequence | None:
         """Look for a path through passages that are too narrow for samples, and cover it at margin zero.
 
-        Paths on larger floors are repaired until they fit the floor. Of those that almost do, the best ones
-        are moved to the middle of their passages, and covered with the smallest boxes: a transport through
-        these takes long.
+        Paths are first sought on floors that are larger, and repaired until they fit the floor. The best of
+        those that almost fit are moved to the middle of their passages. They are covered with the smallest
+        boxes, through which a transport takes long.
 
         Args:
             number: How many such attempts there were before; each has other random numbers.

@@ -129,7 +129,7 @@ class TeamPoint:
 
     Attributes:
         path: The axes that move it, theta first.
-        steps: Of every axis of the path the way from it to the next one, and from the last one to the point.
+        steps: For every axis of the path the vector to the next axis; for the last one that to the point.
         tree: The team.
     """
 

@@ -331,7 +331,7 @@ def _is_grey(colour: Rgba | None) -> bool:
 # The team in the scene: its bodies as the models draw them, and its grasp points.
 
 _SEE_THROUGH = 0.6
-"""Opacity of the object, below which its cell is to be seen."""
+"""Opacity of the object; its cell shows through it."""
 
 _GRASP = 0.07
 """Radius of the sphere at a grasp point [m]."""
