@@ -253,7 +253,7 @@ _REPLACED = {
 """Which signals others get in place of those that a block takes in."""
 
 _NOMINAL = {"object_state": "nominal_object", "robot_state": "nominal_robot"}
-"""Which signals the law of the axes and the reports get where a plan has a nominal motion of the axes."""
+"""Signals that the blocks below get instead, where a plan has a nominal motion of the axes."""
 
 _FOLLOWERS = ("axis_ppc", "ready_monitor")
 """Blocks that act on this nominal motion."""

@@ -50,8 +50,8 @@ class Channel:
 def exits(channel: Channel) -> list[FloatArray]:
     """Where boxes may be left: the middle of the widest part of each two cores' overlap.
 
-    Where a path leaves the boxes, it is the part in which that happens: overlaps that are a tenth of a
-    millimetre wide may have parts that their boxes do not join.
+    An overlap may have several parts, and boxes need not join all of them where it is a tenth of a millimetre
+    wide. If a path leaves the boxes there, its own part counts.
 
     Returns:
         Positions, shape (2,) each [m].

@@ -51,8 +51,8 @@ def speed_shares(problem: PlanningProblem, plan: Plan, spare_rate: float = 0.0) 
         spare_rate: What every axis needs besides [rad/s or m/s].
 
     Yields:
-        Limits, infinity where there is none, shape (2 + n,) [m/s, rad/s or m/s]. Only the first ones, where
-        they do not slow the plan down.
+        Limits, infinity where there is none, shape (2 + n,) [m/s, rad/s or m/s]. If the
+        first ones do not slow the plan down, no others follow.
     """
     limits, needs = problem.limits, _needs(plan)
     needs[1:] += spare_rate

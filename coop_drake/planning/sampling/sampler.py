@@ -171,7 +171,7 @@ class Sampler:
     Args:
         hierarchy: The subsystems of the question.
         workspace: Floor with the wanted clearance taken off [m].
-        gap: Distance that pairs of bodies keep, where they also keep it at the start and goal [m].
+        gap: Distance that two bodies keep, unless they are nearer at the start or the goal [m].
         seed: Seed of the samples.
         progress: Called with the fraction of the subsystems that are done.
 
