@@ -291,7 +291,7 @@ def adapter(kind: Any) -> TypeAdapter[Any]:
 def _validator(kind: Any) -> SchemaValidator:
     from pydantic_core import SchemaValidator
 
-    return SchemaValidator(_strict(adapter(kind).core_schema))
+    return SchemaValidator(_strict(adapter(kind).core_schema), {"allow_inf_nan": False})
 
 
 def _strict(schema: Any) -> Any:

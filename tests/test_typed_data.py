@@ -100,6 +100,8 @@ def test_what_a_class_refuses_is_refused_where_it_stands():
         (AxisGains, [1.0, -1.0], "a[1]"),
         (AxisGains, [1.0, "2.0"], "a[1]"),
         (Vector, [[1.0]], "a[0]"),
+        (Vector, [1.0, math.nan], "a[1]"),
+        (Vector, [math.inf], "a[0]"),
         (Vector, 1.0, "a"),
     ],
 )
