@@ -38,8 +38,8 @@ class PlannerSettings:
         max_transition_time: Longest estimated time of one transition that is accepted [s].
         effort: Work spent on a quicker transport: 0 takes the first path that is found, 2 is twice the
             default. It counts samples and moves, not seconds.
-        strategy: ``portfolio`` samples, certifies and proves; ``cells`` explores by cells alone; ``paper``
-            explores as the paper's algorithms are printed, at margin zero.
+        strategy: ``portfolio`` samples, certifies and proves; ``cells`` explores by cells alone, and
+            ``paper`` as the paper's algorithms are printed, both at margin zero.
     """
 
     margin: NotNegative = 0.1

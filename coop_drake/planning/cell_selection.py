@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import pairwise
 from math import ceil
 from typing import NamedTuple
@@ -117,10 +117,10 @@ def _quickest(
         if better is None:
             return None
         try:
+            channel, targets = better
             return make_plan(
-                problem, better.channel, gain_set, gain_set_name=gain_set_name, targets=better.targets,
-                progress=progress,
-            )  # fmt: skip
+                problem, channel, gain_set, gain_set_name=gain_set_name, targets=targets, progress=progress
+            )
         except TooQuickError:  # other boxes would not be slower
             raise
         except (GeometryError, PlanError, StallError, ShapelyError):
@@ -179,19 +179,6 @@ LARGEST_CLEARANCE = 1.0
 """Larger clearances count as this one [m]: the object has reached its highest speed."""
 
 
-@dataclass(frozen=True)
-class PathCovering:
-    """Boxes along a path, and the points at which each of them is left.
-
-    Attributes:
-        channel: The boxes.
-        targets: A point for every box, in it and in the next one, the last one the goal, each (2,) [m].
-    """
-
-    channel: Channel
-    targets: tuple[FloatArray, ...]
-
-
 def cover_path(
     problem: PlanningProblem,
     path: FloatArray,
@@ -199,7 +186,7 @@ def cover_path(
     gain_set: GainSet,
     least_overlap: float = 0.0,
     limits: FloatArray | None = None,
-) -> PathCovering | None:
+) -> tuple[Channel, tuple[FloatArray, ...]] | None:
     """Cover a path with boxes such that the transport is fast: few boxes, and narrow ones in narrow passages.
 
     The boxes are chosen by their times in closed form, see ``choose_boxes``. Every box is then proved
@@ -216,7 +203,8 @@ def cover_path(
             m/s]; None for none.
 
     Returns:
-        The boxes, or None if no sequence of such boxes was found.
+        The boxes, and for each a point in it and in the next one at which it is left, the last one the goal,
+        shape (2,) [m]; None if no sequence of such boxes was found.
     """
     swept = SweptTree(problem.tree)
     pairs = BodyPairs(swept)
@@ -242,7 +230,7 @@ def cover_path(
         if found is not None:
             free, ends = found
             targets = (*(points[j, :2] for j in ends[:-1]), problem.goal_pose[:2])
-            return PathCovering(Channel(tuple(free), CORE_FRACTION * least_clearance, angle), targets)
+            return Channel(tuple(free), CORE_FRACTION * least_clearance, angle), targets
     return None
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import combinations
 from math import cos, pi
 
@@ -23,6 +23,7 @@ from coop_drake.planning.cells.cells import CellMaker, FreeBox, Region
 from coop_drake.planning.cells.exploration import Exploration, ExplorationResult, Verdict, Watch
 from coop_drake.planning.cells.graph import halves
 from coop_drake.planning.certificates import FAILURES, Floor, Witnesses, slices_proof
+from coop_drake.planning.channel import NoChannel
 from coop_drake.planning.questions import (
     EXTRA_FLOOR,
     goal_beyond_limits,
@@ -53,21 +54,6 @@ OBJECT_RESOLUTION = 0.01
 """Slices of the object alone have one axis; they are split to this fraction of the resolution [-]."""
 
 
-@dataclass(frozen=True)
-class Refutation:
-    """A proof that no plan exists.
-
-    Attributes:
-        reason: Why, in a sentence.
-        robots: Robots that the proof is about, with the object.
-        proof: The proof in a form that can be checked again.
-    """
-
-    reason: str
-    robots: tuple[int, ...]
-    proof: InfeasibilityProof
-
-
 class Proofs:
     """Tries to prove infeasibility by exploring the question and its relaxations in turns, at margin zero.
 
@@ -90,7 +76,7 @@ class Proofs:
         self._pathless: dict[tuple[int, ...], bool] = {}
         self._explorations: dict[tuple[int, ...], Exploration] = {}
         self._outcomes: dict[tuple[int, ...], ExplorationResult] = {}
-        self.refutation: Refutation | None = None
+        self.refutation: NoChannel | None = None
 
     @property
     def slices(self) -> int:
@@ -229,7 +215,7 @@ class Proofs:
         if proof is None:
             return False
         reason = f"the over-approximations of {self._words(chosen)} separate start from goal"
-        self.refutation = Refutation(reason, chosen, proof)
+        self.refutation = NoChannel(True, reason, proof)
         return True
 
 
@@ -255,7 +241,7 @@ ROBOTS_AT_END = 1
 """Robots that are kept in the first explorations."""
 
 
-def refuted_at_an_end(problem: PlanningProblem, watch: Watch | None = None) -> tuple[Refutation | None, int]:
+def refuted_at_an_end(problem: PlanningProblem, watch: Watch | None = None) -> tuple[NoChannel | None, int]:
     """Look for a proof that the team cannot leave the start, or reach the goal, for walls near it.
 
     What is proved on a floor that holds the question's floor is proved for the question.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator
+from collections.abc import Collection
 from dataclasses import replace
 from functools import lru_cache
 from math import pi
@@ -111,9 +111,6 @@ END_FRACTION = 0.2
 CLOSE_FACTOR = 1.1
 """A start or goal with less clearance than this many margins counts as close to a wall [-]."""
 
-NEXT_FRACTION = 0.7
-"""After a margin failed, this fraction of it is tried [-]."""
-
 PATCH_FACTOR = 2.0
 """The floor around a start or goal that is shrunk less reaches this many margins beyond its footprint [-]."""
 
@@ -122,14 +119,6 @@ _REMEMBERED = 4
 
 ARC_SEGMENTS = 32
 """Segments of a quarter circle in exact footprints: a disc's polygon is right to 3e-4 of its radius."""
-
-
-def margins(first: float) -> Iterator[float]:
-    """The margins to try: the first, then seven tenths of each, down to ``SMALLEST_MARGIN`` [m]."""
-    margin = first
-    while margin >= SMALLEST_MARGIN:
-        yield margin
-        margin *= NEXT_FRACTION
 
 
 def shrunk(workspace: Polygon, margin: float) -> MultiPolygon:

@@ -17,7 +17,8 @@ from coop_drake.answers.problem import PlannerSettings, PlanningProblem
 from coop_drake.answers.proof import Cut, InfeasibilityProof, OverCell, OverSlice
 from coop_drake.laws.gains import FixedGains, GainSet
 from coop_drake.planning.cells.cells import FreeBox, Region
-from coop_drake.planning.cells.exploration import ChannelSearched, Event, SeenCell, SliceAdded, Watch
+from coop_drake.planning.cells.exploration import ChannelSearched, Event, SliceAdded, Watch
+from coop_drake.planning.cells.graph import GraphCell
 from coop_drake.planning.channel import Channel, CoveredPath, NoChannel
 from coop_drake.planning.questions import SMALLEST_MARGIN
 from coop_drake.tree.component_tree import Component, ComponentTree, ConvexShape
@@ -182,7 +183,7 @@ class Rescaling:
             found[1:] = np.where(ends[1:] == limits, exact, found[1:])
         return found
 
-    def _seen(self, cells: Sequence[SeenCell]) -> tuple[SeenCell, ...]:
+    def _seen(self, cells: Sequence[GraphCell]) -> tuple[GraphCell, ...]:
         scale = (self.unit, self.unit)
         return tuple(replace(cell, region=Region.of(cell.region.section.scale(scale))) for cell in cells)
 

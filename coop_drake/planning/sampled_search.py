@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from functools import partial
 from itertools import product
 
 import numpy as np
@@ -52,21 +53,6 @@ LARGEST_SHARE = 2
 """So many times as many are drawn at most [-]: twice as many take three times as long."""
 
 
-@dataclass(frozen=True)
-class BoxSequence:
-    """Boxes along a path that are proved free; a channel without its polygons.
-
-    Attributes:
-        boxes: From the start's box to the goal's box.
-        path: The path that they cover, circular axes unwrapped, shape (m, 3 + n) [m, rad].
-        margin: The margin that the path's positions keep in every box [m].
-    """
-
-    boxes: tuple[FreeBox, ...]
-    path: FloatArray
-    margin: float
-
-
 def samples_of_attempt(number: int) -> int:
     """Samples for every subsystem in an attempt, counted from 1: few at first, then many."""
     if number <= LIGHT_ATTEMPTS:
@@ -106,7 +92,7 @@ only if boxes cannot cover the path after the shorter one."""
 
 
 class SampledSearch:
-    """Finds a box sequence at margin zero first, then looks for a larger margin near it.
+    """Finds a path that boxes cover at margin zero first, then looks for a larger margin near it.
 
     What it finds is proved by the boxes, whatever was sampled. If it finds nothing, that is no proof.
 
@@ -136,7 +122,7 @@ class SampledSearch:
         number: int,
         progress: Callable[[float], None] | None = None,
         part: tuple[int, ...] | None = None,
-    ) -> Iterator[BoxSequence | None]:
+    ) -> Iterator[CoveredPath | None]:
         """Sample some paths and cover each of them at margin zero, all with other samples.
 
         Args:
@@ -155,7 +141,7 @@ class SampledSearch:
                     self.object_blocked = self.object_blocked + 1 if blocked else 0
             yield found
 
-    def around(self, guide: FloatArray) -> BoxSequence | None:
+    def around(self, guide: FloatArray) -> CoveredPath | None:
         """Sample paths around another one, which need not be free, and cover them at margin zero.
 
         Args:
@@ -179,7 +165,7 @@ class SampledSearch:
         progress: Callable[[float], None] | None,
         guide: FloatArray | None = None,
         part: tuple[int, ...] | None = None,
-    ) -> tuple[BoxSequence | None, bool]:
+    ) -> tuple[CoveredPath | None, bool]:
         """The boxes along a sampled path, if any, and whether no path was found even for the object alone."""
         clearance, gap = CLEARANCES[(number - 1) % len(CLEARANCES)]
         workspace = marginal_workspace(self._problem, clearance)
@@ -208,7 +194,7 @@ class SampledSearch:
         progress: Callable[[float], None] | None = None,
         *,
         object_first: bool = False,
-    ) -> BoxSequence | None:
+    ) -> CoveredPath | None:
         """Look for a path through passages that are too narrow for samples, and cover it at margin zero.
 
         Paths are first sought on floors that are larger, and repaired until they fit the floor. The best of
@@ -274,8 +260,8 @@ class SampledSearch:
         return sampler.path_around(GuidePath(path, guide.joints), NARROW_SAMPLES)
 
     def with_margin(
-        self, first: BoxSequence, progress: Callable[[float, float], None], share: float = 1.0
-    ) -> BoxSequence:
+        self, first: CoveredPath, progress: Callable[[float, float], None], share: float = 1.0
+    ) -> CoveredPath:
         """Move the best path away from the walls, and cover it at the largest margin that it keeps.
 
         Args:
@@ -294,14 +280,13 @@ class SampledSearch:
         """Find another path by other samples; see ``CoveredPath``."""
         try:
             near = another_candidate(self._problem, self._hierarchy, BODY_GAP, number, share)
-            found = None if near is None else self._moved(near, share)
+            return None if near is None else self._moved(near, share)
         except (GeometryError, ShapelyError):
             return None
-        return None if found is None else self.covered_path(found, found)
 
     def _moved(
         self, near: FloatArray, share: float, progress: Callable[[float, float], None] | None = None
-    ) -> BoxSequence | None:
+    ) -> CoveredPath | None:
         """Move a path away from the walls, and cover it at the largest margin that it keeps."""
         path = moved_from_obstacles(self._problem, near, BODY_GAP, share)
         for margin in margins_to_try(self._problem, path):
@@ -323,40 +308,30 @@ class SampledSearch:
         *,
         longest: bool = False,
         smallest: bool = False,
-    ) -> BoxSequence | None:
+    ) -> CoveredPath | None:
         """Cover a path with boxes that keep a margin."""
         workspace = marginal_workspace(self._problem, margin)
         certifier = Certifier(self._swept, self._pairs, workspace, self._scale, margin)
         report = None if progress is None else (lambda fraction: progress(margin, fraction))
         boxes = certifier.boxes(path, report, longest=longest, smallest=smallest)
         self.slices += certifier.trials
-        return None if boxes is None else BoxSequence(tuple(boxes), path, margin)
-
-    def covered_path(self, found: BoxSequence, spare: BoxSequence) -> CoveredPath:
-        """The path of some boxes, whose polygons are made on request.
-
-        Args:
-            found: The boxes.
-            spare: Boxes to use if the polygons of the others cannot be made.
-        """
-
-        def channel() -> Channel:
-            made = self._channel(found) or self._channel(spare)
-            if made is None:
-                raise GeometryError("the free positions of the boxes along a path cannot be computed")
-            return made
-
-        return CoveredPath(found.path, found.margin, channel, self.another)
-
-    def _channel(self, found: BoxSequence) -> Channel | None:
-        """Boxes with all positions that are free for them; None if geometry fails."""
-        regions = Regions(self._problem, self._swept, self._pairs, found.margin)
-        boxes = [regions.around(box) for box in found.boxes]
-        made = [box for box in boxes if box is not None]
-        if len(made) < len(boxes):
+        if boxes is None:
             return None
-        ends = np.array([box.positions[-1] for box in found.boxes])
-        return replace(make_channel(self._problem, made, found.margin, found.path), ends=ends)
+        return CoveredPath(path, margin, partial(self._channel, boxes, path, margin), self.another)
+
+    def _channel(self, boxes: Sequence[FreeBox], path: FloatArray, margin: float) -> Channel:
+        """Boxes along a path with all positions that are free for them.
+
+        Raises:
+            GeometryError: If geometry fails.
+        """
+        regions = Regions(self._problem, self._swept, self._pairs, margin)
+        made = [regions.around(box) for box in boxes]
+        free = [box for box in made if box is not None]
+        if len(free) < len(boxes):
+            raise GeometryError("the free positions of the boxes along a path cannot be computed")
+        ends = np.array([box.positions[-1] for box in boxes])
+        return replace(make_channel(self._problem, free, margin, path), ends=ends)
 
 
 # A free end within the goal's tolerances, where the middle of the goal is not free.

@@ -21,11 +21,8 @@ from shapely.errors import ShapelyError
 from coop_drake.answers.plan import SearchReport
 from coop_drake.answers.problem import PlanningProblem
 from coop_drake.errors import GeometryError, PatienceError, PlanError
-from coop_drake.geometry.minkowski import to_polygon
-from coop_drake.geometry.swept_tree import BodyPairs, SweptTree
 from coop_drake.planning.cells.as_printed import PaperExploration
-from coop_drake.planning.cells.cells import CellMaker, FreeBox
-from coop_drake.planning.cells.exploration import Exploration, ExplorationResult, Subdivision, Verdict, Watch
+from coop_drake.planning.cells.exploration import Exploration, Verdict, Watch
 from coop_drake.planning.certificates import Witnesses, slices_proof
 from coop_drake.planning.channel import (
     Channel,
@@ -38,12 +35,10 @@ from coop_drake.planning.proofs import Proofs, blocked_goal, clearance_bound, re
 from coop_drake.planning.questions import (
     check_question,
     goal_beyond_limits,
-    marginal_workspace,
-    margins,
     within_limits,
 )
 from coop_drake.planning.rescaling import Rescaling
-from coop_drake.planning.sampled_search import BoxSequence, SampledSearch, ending_freely
+from coop_drake.planning.sampled_search import SampledSearch, ending_freely
 from coop_drake.progress import Progress
 from coop_drake.tree.component_tree import usual_unit
 from coop_drake.tree.pose import FloatArray
@@ -200,7 +195,7 @@ class _Search:
         refutation, slices = refuted_at_an_end(self._problem, self._watch)
         self._other_slices += slices
         if refutation is not None:
-            return NoChannel(True, refutation.reason, refutation.proof)
+            return refutation
         budget = self._problem.settings.max_slices
         each, short = min(FIRST_EXPLORATION, budget), min(SHORT_EXPLORATION, budget)
         object_blocked = self._samples.object_blocked > 0
@@ -214,9 +209,8 @@ class _Search:
         while found is None:
             attempts = self._attempts(ATTEMPTS_PER_ROUND)  # By what was blocked before this exploration.
             verdict = self._explored(each)
-            refutation = self._proofs.refutation
-            if refutation is not None:
-                return NoChannel(True, refutation.reason, refutation.proof)
+            if self._proofs.refutation is not None:
+                return self._proofs.refutation
             if verdict is Verdict.FOUND:
                 self._first_plan = thread_time() - self._began
                 return self._around(make_channel(self._problem, self._proofs.boxes(), 0.0, None))
@@ -228,14 +222,14 @@ class _Search:
             each = min(2 * each, budget)
         return self._with_margin(found)
 
-    def _sampled(self, attempts: int) -> BoxSequence | None:
+    def _sampled(self, attempts: int) -> CoveredPath | None:
         """Sample paths and cover them with boxes; fewer times if the object alone seems blocked."""
         return self._first_of(self._attempts(attempts))
 
-    def _attempts(self, number: int) -> Iterator[BoxSequence | None]:
+    def _attempts(self, number: int) -> Iterator[CoveredPath | None]:
         return self._samples.attempts(number, self._phase("sampling paths"), self._proofs.blocked_part)
 
-    def _first_of(self, attempts: Iterator[BoxSequence | None]) -> BoxSequence | None:
+    def _first_of(self, attempts: Iterator[CoveredPath | None]) -> CoveredPath | None:
         """The first boxes of some attempts; attempts end where the object alone seems blocked."""
         self._phase("sampling paths")(0.0)
         for found in attempts:
@@ -246,13 +240,13 @@ class _Search:
                 return None
         return None
 
-    def _narrow(self, slices: int, object_blocked: bool) -> BoxSequence | None:
+    def _narrow(self, slices: int, object_blocked: bool) -> CoveredPath | None:
         """Look for narrow passages, unless a short exploration of few robots answers the question."""
         robots = 0 if object_blocked else FEW_ROBOTS
         verdict = self._explored(slices, robots, untested=object_blocked)
         return None if verdict in (Verdict.INFEASIBLE, Verdict.FOUND) else self._narrow_sampled()
 
-    def _narrow_sampled(self) -> BoxSequence | None:
+    def _narrow_sampled(self) -> CoveredPath | None:
         """Sample paths through narrow passages, other ones each time."""
         phase, first = self._phase("sampling narrow passages"), self._proofs.blocked_part == ()
         found = self._samples.narrow_attempt(self._narrow_attempts, phase, object_first=first)
@@ -273,7 +267,7 @@ class _Search:
         most = self._problem.settings.max_slices
         return self._proofs.run(slices, robots, lambda count: report(count / most), untested=untested)
 
-    def _with_margin(self, found: BoxSequence) -> CoveredPath:
+    def _with_margin(self, found: CoveredPath) -> CoveredPath:
         """The path at the largest margin that is found."""
 
         def report(margin: float, fraction: float) -> None:
@@ -282,8 +276,14 @@ class _Search:
         try:
             best = self._samples.with_margin(found, report, min(1.0, self._problem.settings.effort))
         except (GeometryError, ShapelyError, PatienceError):
-            best = found
-        return self._samples.covered_path(best, found)
+            return found
+
+        def channel() -> Channel:
+            with suppress(GeometryError):
+                return best.channel()
+            return found.channel()
+
+        return replace(best, channel=channel)
 
     def _undecided(self, verdict: Verdict) -> NoChannel:
         bound, slices = clearance_bound(self._problem)
@@ -306,79 +306,34 @@ class _Search:
 
 # Search by cells alone, without samples: with our order of splits, or as the paper prints it.
 
-MARGIN_BUDGET_DIVISOR = 8
-"""An exploration at a margin may make this fraction of the slices, one in eight: most of them fail, and a
-plan at margin zero exists already."""
-
 
 def search_by_cells(
     problem: PlanningProblem, progress: Progress | None = None, watch: Watch | None = None
 ) -> tuple[Channel | NoChannel, SearchReport]:
-    """Search by cells alone; only an exploration at margin zero may answer "infeasible".
+    """Search by cells alone, at margin zero.
 
     Args:
-        problem: The question. Its strategy is ``cells``, which also tries margins once there is a channel at
-            margin zero, or ``paper``, which always uses margin zero.
+        problem: The question; its strategy is ``cells`` or ``paper``.
         progress: Called with a phase and the fraction of the slices that are made.
-        watch: Called with the events of explorations.
+        watch: Called with the events of the exploration.
 
     Returns:
         The channel, or why there is none, and a report.
     """
-    exploration, outcome = _explored_at(problem, 0.0, progress, watch)
-    slices = outcome.slices
-    if outcome.verdict is not Verdict.FOUND:
-        return _no_channel(problem, exploration, outcome), SearchReport(slices)
-    for margin in margins(problem.settings.margin) if problem.settings.strategy == "cells" else ():
-        wider, found = _explored_at(problem, margin, progress, watch)
-        slices += found.slices
-        if found.verdict is Verdict.FOUND:
-            boxes = _boxes_at_margin(problem, wider.boxes(found.path))
-            return make_channel(problem, boxes, margin, None), SearchReport(slices)
-    return make_channel(problem, exploration.boxes(outcome.path), 0.0, None), SearchReport(slices)
-
-
-def _explored_at(
-    problem: PlanningProblem, margin: float, progress: Progress | None, watch: Watch | None
-) -> tuple[Subdivision, ExplorationResult]:
-    """Explore at a margin, with all slices at margin zero and with a fraction of them at others."""
-    budget = problem.settings.max_slices
-    exploration = _exploration(problem, margin, watch)
-    report = None
-    if progress is not None:
-        phase = f"exploring slices at margin {margin:.3f} m"
-        report = lambda count: progress(phase, count / budget)  # noqa: E731
-    return exploration, exploration.run(budget // MARGIN_BUDGET_DIVISOR if margin > 0.0 else budget, report)
-
-
-def _exploration(problem: PlanningProblem, margin: float, watch: Watch | None) -> Subdivision:
-    workspace = marginal_workspace(problem, margin)
-    if problem.settings.strategy == "paper":
-        return PaperExploration(problem, workspace, watch)
-    words = f"the whole team at margin {margin:.3f} m" if margin > 0.0 else "the whole team"
-    return Exploration(problem, workspace, watch, words)
-
-
-def _boxes_at_margin(problem: PlanningProblem, found: list[FreeBox]) -> list[FreeBox]:
-    """Boxes whose cores were found at a margin, with the positions around them that are free without it."""
-    swept = SweptTree(problem.tree)
-    maker = CellMaker(swept, BodyPairs(swept), problem.workspace)
-
-    def around(box: FreeBox) -> FreeBox:
-        regions = (to_polygon(region.section) for region in maker.under_cells(box.intervals))
-        return replace(box, polygon=max(regions, key=lambda full: full.intersection(box.core).area))
-
-    return list(map(around, found))
-
-
-def _no_channel(problem: PlanningProblem, exploration: Subdivision, outcome: ExplorationResult) -> NoChannel:
-    """The answer of an exploration at margin zero that found no channel."""
-    if outcome.verdict is Verdict.INFEASIBLE:
-        witnesses = Witnesses(problem.tree, exploration.swept, exploration.pairs, exploration.maker)
-        proof = slices_proof(problem, exploration.slices, exploration.over_leaves(), witnesses)
-        if proof is None:
-            return NoChannel(False, "a proof of infeasibility was found but cannot be written down")
-        reason = f"the over-approximations of {outcome.slices} slices separate start from goal"
-        return NoChannel(True, reason, proof)
-    reason = outcome.verdict.explanation(outcome.slices)
-    return NoChannel(False, reason, mixed=exploration.undecided(outcome.path))
+    explore = PaperExploration if problem.settings.strategy == "paper" else Exploration
+    exploration, most = explore(problem, None, watch), problem.settings.max_slices
+    outcome = exploration.run(
+        most, None if progress is None else lambda count: progress("exploring slices", count / most)
+    )
+    report = SearchReport(outcome.slices)
+    if outcome.verdict is Verdict.FOUND:
+        return make_channel(problem, exploration.boxes(outcome.path), 0.0, None), report
+    if outcome.verdict is not Verdict.INFEASIBLE:
+        reason = outcome.verdict.explanation(outcome.slices)
+        return NoChannel(False, reason, mixed=exploration.undecided(outcome.path)), report
+    witnesses = Witnesses(problem.tree, exploration.swept, exploration.pairs, exploration.maker)
+    proof = slices_proof(problem, exploration.slices, exploration.over_leaves(), witnesses)
+    if proof is None:
+        return NoChannel(False, "a proof of infeasibility was found but cannot be written down"), report
+    reason = f"the over-approximations of {outcome.slices} slices separate start from goal"
+    return NoChannel(True, reason, proof), report

@@ -22,12 +22,11 @@ from coop_drake.planning.cells.exploration import (
     ExplorationBegan,
     ExplorationEnded,
     ExplorationResumed,
-    SeenCell,
     SliceAdded,
     SliceSplit,
     Verdict,
 )
-from coop_drake.planning.cells.graph import Kind
+from coop_drake.planning.cells.graph import GraphCell, Kind
 from coop_drake.planning.channel import Channel
 from coop_drake.planning.questions import marginal_workspace
 from coop_drake.planning.search import find_channel
@@ -130,10 +129,10 @@ def _record_portfolio(problem: PlanningProblem, margin: float, progress: Progres
 def _box_events(channel: Channel, robots: tuple[int, ...]) -> list[Event]:
     """Return the boxes of a channel as events: each box is a slice of its own that is free."""
     events: list[Event] = [ExplorationBegan(BOXES, robots)]
-    cells: list[SeenCell] = []
+    cells: list[GraphCell] = []
     for number, box in enumerate(channel.boxes):
         section = CrossSection(polygon_rings(box.polygon), FillRule.Positive)
-        cell = SeenCell(number, Kind.FREE, Region.of(section))
+        cell = GraphCell(number, number, Kind.FREE, Region.of(section), 1.0)
         cells.append(cell)
         intervals = tuple((float(a), float(b)) for a, b in zip(box.lower, box.upper, strict=True))
         events += [SliceAdded(number, intervals, (cell,)), ChannelSearched(tuple(cells), float(len(cells)))]
@@ -155,7 +154,7 @@ class Leaf:
 
     slice: int
     intervals: Intervals
-    cells: tuple[SeenCell, ...]
+    cells: tuple[GraphCell, ...]
 
     def regions(self, kind: Kind) -> list[Region]:
         """Return the regions of its cells of one kind."""

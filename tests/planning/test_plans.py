@@ -252,14 +252,13 @@ def test_fixed_gains_get_boxes_of_their_own(base_channel):
 
 def test_targets_lie_in_the_cores_of_both_boxes_and_cores_inside(base_channel):
     problem, channel = base_channel
-    found = cover_path(problem, channel.path, channel.margin, ScheduledGains())
-    assert found is not None
-    assert 0.0 < found.channel.margin < channel.margin
-    for index, (here, after) in enumerate(zip(found.channel.boxes, found.channel.boxes[1:], strict=False)):
-        assert here.core.contains(Point(found.targets[index]))
-        assert after.core.contains(Point(found.targets[index]))
+    covered, targets = cover_path(problem, channel.path, channel.margin, ScheduledGains())
+    assert 0.0 < covered.margin < channel.margin
+    for index, (here, after) in enumerate(zip(covered.boxes, covered.boxes[1:], strict=False)):
+        assert here.core.contains(Point(targets[index]))
+        assert after.core.contains(Point(targets[index]))
         assert here.polygon.covers(here.core)
-        assert here.polygon.boundary.distance(here.core) >= found.channel.margin - 1e-7
+        assert here.polygon.boundary.distance(here.core) >= covered.margin - 1e-7
         assert (np.maximum(here.lower, after.lower) < np.minimum(here.upper, after.upper)).all()
 
 

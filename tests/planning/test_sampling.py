@@ -20,7 +20,7 @@ from coop_drake.geometry.swept_tree import BodyPairs, SweptTree
 from coop_drake.laws import ScheduledGains
 from coop_drake.planning.boxes import box_arrays, box_clearance, room_for_sweeps, sweeps_apart, swept_piece
 from coop_drake.planning.cells.cells import CellMaker
-from coop_drake.planning.channel import Channel, middle_of
+from coop_drake.planning.channel import Channel, Regions, middle_of
 from coop_drake.planning.planner import plan
 from coop_drake.planning.questions import exact_footprint, marginal_workspace, nearby
 from coop_drake.planning.sampled_search import SampledSearch
@@ -382,7 +382,7 @@ def test_margins_fall_and_keep_to_what_is_asked(problem, bent):
 
 
 def test_polygons_that_cannot_be_made_are_no_channel_and_no_proof(problem, monkeypatch):
-    monkeypatch.setattr(SampledSearch, "_channel", lambda self, chain: None)
+    monkeypatch.setattr(Regions, "around", lambda self, box: None)
     path, _ = find_path(problem)
     with pytest.raises(GeometryError, match="cannot be computed"):
         path.channel()

@@ -29,7 +29,27 @@ from coop_drake.planning.cells.graph import (
 from coop_drake.planning.duration import SETTLING_TIME
 from coop_drake.tree.component_tree import axis_levers
 
-# Strong branching: halve a cell of a path on trial, and see what remains of the path.
+# 1. Slices: those of MIXED cells first. Only if the path has none, those of GUIDE cells.
+# 2. Axes: those wider than the resolution. In a MIXED cell where one component alone blocks the path in the
+#    middle of the slice, only the axes that move this component.
+# 3. Every such axis is halved on trial, except those along which the team sweeps far less than along others.
+# 4. An axis whose halving disconnects the path wins; on a path with such slices, only these are halved.
+# 5. Otherwise an axis that may separate two bodies that touch wins; otherwise the one that leaves the
+#    smallest area of over-cells; if these areas are equal, the axis along which the team sweeps furthest.
+#
+# Every ``Exploration`` uses this order: proofs of infeasibility, the clearance bound, the strategy
+# ``cells``. The sampled search of ``portfolio`` and the strategy ``paper`` (``as_printed.py``) do
+# not.
+
+LARGEST_SWEEP_RATIO = 16.0
+"""An axis is not tried if another axis of the slice sweeps the team this many times as far [-]: halving it
+would make slices so thin that its own halvings show no effect."""
+
+EQUAL_AREA_FRACTION = 1e-3
+"""Trials whose areas differ by less than this fraction of the cell's area are called equal [-]."""
+
+LARGEST_CONTACT_SWEEP_RATIO = 2.0
+"""An axis that may separate two bodies is preferred unless another axis sweeps more than twice as far [-]."""
 
 
 @dataclass(frozen=True)
@@ -54,8 +74,8 @@ class _Part:
     region: Region
 
 
-class StrongBranching:
-    """Halves cells on trial for one exploration.
+class SplitOrder:
+    """Chooses the splits of one exploration; cells are halved on trial (strong branching).
 
     Args:
         problem: Start and goal, where paths begin and end.
@@ -65,9 +85,81 @@ class StrongBranching:
 
     def __init__(self, problem: PlanningProblem, slices: Slices, maker: CellMaker) -> None:
         self._slices, self._maker = slices, maker
+        self._levers = axis_levers(problem.tree)
+        self._finest = finest_widths(problem)
         self._times_blocking: Counter[int] = Counter()
         self._start = [float(angle) for angle in problem.start[2:]], problem.start[:2]
         self._goal = goal_box(problem), problem.goal_pose[:2], problem.position_tolerance
+
+    def splittable(self, intervals: Intervals) -> list[int]:
+        """Axes of a slice that are wider than the resolution."""
+        return [
+            axis
+            for axis, ((lower, upper), finest) in enumerate(zip(intervals, self._finest, strict=True))
+            if upper - lower > finest
+        ]
+
+    def splits(self, path: Sequence[GraphCell]) -> list[tuple[int, int]]:
+        """Choose the slices to halve, each with its axis.
+
+        Args:
+            path: Cells from the start to the goal.
+
+        Returns:
+            Slice ids and axes; empty if every undecided slice of the path is below the resolution.
+        """
+        best = [(path[place].slice, self._best(path, place)) for place in self._undecided(path)]
+        separating = [(index, trial.axis) for index, trial in best if trial.disconnects]
+        return separating or [(index, trial.axis) for index, trial in best]
+
+    def _undecided(self, path: Sequence[GraphCell]) -> list[int]:
+        """Places on the path of the cells to halve, one for each slice."""
+        places: dict[Kind, dict[int, int]] = {Kind.MIXED: {}, Kind.GUIDE: {}}
+        for place, cell in enumerate(path):
+            if cell.kind is not Kind.FREE and self.splittable(self._slices.all[cell.slice].intervals):
+                places[cell.kind].setdefault(cell.slice, place)
+        return list((places[Kind.MIXED] or places[Kind.GUIDE]).values())
+
+    def _best(self, path: Sequence[GraphCell], place: int) -> TrialSplit:
+        """Halve the cell at a place along every useful axis on trial and return the best trial."""
+        cell = path[place]
+        intervals = self._slices.all[cell.slice].intervals
+        sweeps = {
+            axis: (intervals[axis][1] - intervals[axis][0]) * self._levers[axis]
+            for axis in self.splittable(intervals)
+        }
+        if cell.kind is Kind.MIXED:
+            blocking = [axis for axis in self.blocking_axes(path, place) if axis in sweeps]
+            sweeps = {axis: sweeps[axis] for axis in blocking} or sweeps
+        furthest = max(sweeps.values())
+        trials = [
+            self.trial(path, place, axis)
+            for axis, sweep in sweeps.items()
+            if sweep * LARGEST_SWEEP_RATIO >= furthest
+        ]
+        separating = [trial for trial in trials if trial.disconnects]
+        contact = None if separating else self._contact_axis(cell, intervals, sweeps)
+        if contact is not None:
+            return self.trial(path, place, contact)
+        trials = separating or trials
+        areas = [trial.area for trial in trials]
+        if max(areas) - min(areas) <= EQUAL_AREA_FRACTION * cell.region.area:
+            return max(trials, key=lambda trial: (sweeps[trial.axis], -trial.axis))
+        return min(trials, key=lambda trial: (trial.area, trial.axis))
+
+    def _contact_axis(self, cell: GraphCell, intervals: Intervals, sweeps: dict[int, float]) -> int | None:
+        """Return the axis that may separate two bodies in contact, or None if there is no such axis.
+
+        In a MIXED cell the contact counts if it is at the slice's middle, because walls may block the rest.
+        In a GUIDE cell, whose middle is free, it counts anywhere: the slice has no under-cell because of it.
+        """
+        middle = tuple((0.5 * (lower + upper), 0.5 * (lower + upper)) for lower, upper in intervals)
+        probe = self._slices.expanded(intervals) if cell.kind is Kind.GUIDE else middle
+        pair = self._maker.touching_pair(probe)
+        involved = [axis for axis in pair.axes if axis in sweeps] if pair is not None else []
+        axis = max(involved, key=lambda axis: (sweeps[axis], -axis), default=None)
+        too_fine = axis is None or LARGEST_CONTACT_SWEEP_RATIO * sweeps[axis] < max(sweeps.values())
+        return None if too_fine else axis
 
     def trial(self, path: Sequence[GraphCell], place: int, axis: int) -> TrialSplit:
         """Halve the cell at a place of a path along an axis, on trial."""
@@ -144,109 +236,6 @@ def _joined(parts: Sequence[_Part], first: Sequence[bool], last: Sequence[bool])
     return False
 
 
-# 1. Slices: those of MIXED cells first. Only if the path has none, those of GUIDE cells.
-# 2. Axes: those wider than the resolution. In a MIXED cell where one component alone blocks the path in the
-#    middle of the slice, only the axes that move this component.
-# 3. Every such axis is halved on trial, except those along which the team sweeps far less than along others.
-# 4. An axis whose halving disconnects the path wins; on a path with such slices, only these are halved.
-# 5. Otherwise an axis that may separate two bodies that touch wins; otherwise the one that leaves the
-#    smallest area of over-cells; if these areas are equal, the axis along which the team sweeps furthest.
-#
-# Every ``Exploration`` uses this order: proofs of infeasibility, the clearance bound, the strategy
-# ``cells``. The sampled search of ``portfolio`` and the strategy ``paper`` (``as_printed.py``) do
-# not.
-
-LARGEST_SWEEP_RATIO = 16.0
-"""An axis is not tried if another axis of the slice sweeps the team this many times as far [-]: halving it
-would make slices so thin that its own halvings show no effect."""
-
-EQUAL_AREA_FRACTION = 1e-3
-"""Trials whose areas differ by less than this fraction of the cell's area are called equal [-]."""
-
-LARGEST_CONTACT_SWEEP_RATIO = 2.0
-"""An axis that may separate two bodies is preferred unless another axis sweeps more than twice as far [-]."""
-
-
-class SplitOrder:
-    """Chooses the splits of one exploration."""
-
-    def __init__(self, problem: PlanningProblem, slices: Slices, maker: CellMaker) -> None:
-        self._slices, self._maker = slices, maker
-        self._levers = axis_levers(problem.tree)
-        self._branching = StrongBranching(problem, slices, maker)
-        self._finest = finest_widths(problem)
-
-    def splittable(self, intervals: Intervals) -> list[int]:
-        """Axes of a slice that are wider than the resolution."""
-        return [
-            axis
-            for axis, ((lower, upper), finest) in enumerate(zip(intervals, self._finest, strict=True))
-            if upper - lower > finest
-        ]
-
-    def splits(self, path: Sequence[GraphCell]) -> list[tuple[int, int]]:
-        """Choose the slices to halve, each with its axis.
-
-        Args:
-            path: Cells from the start to the goal.
-
-        Returns:
-            Slice ids and axes; empty if every undecided slice of the path is below the resolution.
-        """
-        best = [(path[place].slice, self._best(path, place)) for place in self._undecided(path)]
-        separating = [(index, trial.axis) for index, trial in best if trial.disconnects]
-        return separating or [(index, trial.axis) for index, trial in best]
-
-    def _undecided(self, path: Sequence[GraphCell]) -> list[int]:
-        """Places on the path of the cells to halve, one for each slice."""
-        places: dict[Kind, dict[int, int]] = {Kind.MIXED: {}, Kind.GUIDE: {}}
-        for place, cell in enumerate(path):
-            if cell.kind is not Kind.FREE and self.splittable(self._slices.all[cell.slice].intervals):
-                places[cell.kind].setdefault(cell.slice, place)
-        return list((places[Kind.MIXED] or places[Kind.GUIDE]).values())
-
-    def _best(self, path: Sequence[GraphCell], place: int) -> TrialSplit:
-        """Halve the cell at a place along every useful axis on trial and return the best trial."""
-        cell = path[place]
-        intervals = self._slices.all[cell.slice].intervals
-        sweeps = {
-            axis: (intervals[axis][1] - intervals[axis][0]) * self._levers[axis]
-            for axis in self.splittable(intervals)
-        }
-        if cell.kind is Kind.MIXED:
-            blocking = [axis for axis in self._branching.blocking_axes(path, place) if axis in sweeps]
-            sweeps = {axis: sweeps[axis] for axis in blocking} or sweeps
-        furthest = max(sweeps.values())
-        trials = [
-            self._branching.trial(path, place, axis)
-            for axis, sweep in sweeps.items()
-            if sweep * LARGEST_SWEEP_RATIO >= furthest
-        ]
-        separating = [trial for trial in trials if trial.disconnects]
-        contact = None if separating else self._contact_axis(cell, intervals, sweeps)
-        if contact is not None:
-            return self._branching.trial(path, place, contact)
-        trials = separating or trials
-        areas = [trial.area for trial in trials]
-        if max(areas) - min(areas) <= EQUAL_AREA_FRACTION * cell.region.area:
-            return max(trials, key=lambda trial: (sweeps[trial.axis], -trial.axis))
-        return min(trials, key=lambda trial: (trial.area, trial.axis))
-
-    def _contact_axis(self, cell: GraphCell, intervals: Intervals, sweeps: dict[int, float]) -> int | None:
-        """Return the axis that may separate two bodies in contact, or None if there is no such axis.
-
-        In a MIXED cell the contact counts if it is at the slice's middle, because walls may block the rest.
-        In a GUIDE cell, whose middle is free, it counts anywhere: the slice has no under-cell because of it.
-        """
-        middle = tuple((0.5 * (lower + upper), 0.5 * (lower + upper)) for lower, upper in intervals)
-        probe = self._slices.expanded(intervals) if cell.kind is Kind.GUIDE else middle
-        pair = self._maker.touching_pair(probe)
-        involved = [axis for axis in pair.axes if axis in sweeps] if pair is not None else []
-        axis = max(involved, key=lambda axis: (sweeps[axis], -axis), default=None)
-        too_fine = axis is None or LARGEST_CONTACT_SWEEP_RATIO * sweeps[axis] < max(sweeps.values())
-        return None if too_fine else axis
-
-
 def finest_widths(problem: PlanningProblem) -> tuple[float, ...]:
     """Resolution of every axis (theta, q...): intervals that are no wider are not halved [rad or m]."""
     angle, length = problem.settings.angle_resolution, problem.settings.length_resolution
@@ -256,21 +245,6 @@ def finest_widths(problem: PlanningProblem) -> tuple[float, ...]:
 # Explorations of the configuration space at one margin; Algorithm 1 with our order of splits.
 
 # Events of an exploration, one for each step, for displays of the search.
-
-
-@dataclass(frozen=True, eq=False)
-class SeenCell:
-    """A cell of the graph, as events show it.
-
-    Attributes:
-        slice: Id of its slice.
-        kind: What is known about it.
-        region: Positions p_WL.
-    """
-
-    slice: int
-    kind: Kind
-    region: Region
 
 
 @dataclass(frozen=True, eq=False)
@@ -309,7 +283,7 @@ class SliceAdded:
 
     slice: int
     intervals: Intervals
-    cells: tuple[SeenCell, ...]
+    cells: tuple[GraphCell, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -334,7 +308,7 @@ class ChannelSearched:
         cost: Its total weight, 0 for an empty path.
     """
 
-    cells: tuple[SeenCell, ...]
+    cells: tuple[GraphCell, ...]
     cost: float
 
 
@@ -353,11 +327,6 @@ class ExplorationEnded:
 
 Event = ExplorationBegan | ExplorationResumed | SliceAdded | SliceSplit | ChannelSearched | ExplorationEnded
 Watch = Callable[[Event], None]
-
-
-def seen(cells: Sequence[GraphCell]) -> tuple[SeenCell, ...]:
-    """Cells of the graph, as events show them."""
-    return tuple(SeenCell(cell.slice, cell.kind, cell.region) for cell in cells)
 
 
 TIME_PER_INVERSE_BREADTH = 0.03
@@ -489,11 +458,11 @@ class Subdivision(ABC):
 
     def _searched(self, path: Sequence[GraphCell]) -> None:
         if self._watch is not None:
-            self._watch(ChannelSearched(seen(path), sum(cell.weight for cell in path)))
+            self._watch(ChannelSearched(tuple(path), sum(cell.weight for cell in path)))
 
     def _added(self, index: int, cells: Sequence[GraphCell]) -> None:
         if self._watch is not None:
-            self._watch(SliceAdded(index, self.slices.all[index].intervals, seen(cells)))
+            self._watch(SliceAdded(index, self.slices.all[index].intervals, tuple(cells)))
 
     def _result(self, verdict: Verdict, path: Sequence[GraphCell]) -> ExplorationResult:
         return ExplorationResult(verdict, tuple(path), len(self.slices.all))
