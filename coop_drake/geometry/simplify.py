@@ -57,20 +57,15 @@ def simplify_inward(polygon: Polygon, tolerance: float, slack: float = 0.0) -> P
     return simple if simple.is_valid and simple.area > 0.0 else oriented
 
 
-def vertex_angles(polygon: Polygon) -> FloatArray:
-    """Interior angle at every vertex of every ring, shape (n,) [rad], in (0, 2 pi)."""
-    angles = []
+def sharpest_angle(polygon: Polygon) -> float:
+    """The smaller of the smallest interior angle and what the largest one lacks to a full turn [rad]."""
+    sharpest = np.pi
     for points in corners_of(shapely.orient_polygons(polygon)):
         arriving, leaving = points - np.roll(points, 1, axis=0), np.roll(points, -1, axis=0) - points
         cross = arriving[:, 0] * leaving[:, 1] - arriving[:, 1] * leaving[:, 0]
-        angles.append(np.pi - np.arctan2(cross, (arriving * leaving).sum(axis=1)))
-    return np.concatenate(angles)
-
-
-def sharpest_angle(polygon: Polygon) -> float:
-    """The smaller of the smallest interior angle and what the largest one lacks to a full turn [rad]."""
-    angles = vertex_angles(polygon)
-    return float(min(angles.min(), 2.0 * np.pi - angles.max()))
+        angles = np.pi - np.arctan2(cross, (arriving * leaving).sum(axis=1))
+        sharpest = min(sharpest, float(angles.min()), float(2.0 * np.pi - angles.max()))
+    return sharpest
 
 
 @compiled(borrows=True)

@@ -226,11 +226,13 @@ def cover_path(
             boxes, grid, points, places, np.array(pads), goals, schedule_of(gain_set), limits,
             least_clearance,
         )  # fmt: skip
-        found = _fastest_boxes(waypoints, Regions(problem, swept, pairs, CORE_FRACTION * least_clearance))
-        if found is not None:
-            free, ends = found
-            targets = (*(points[j, :2] for j in ends[:-1]), problem.goal_pose[:2])
-            return Channel(tuple(free), CORE_FRACTION * least_clearance, angle), targets
+        rows, margin = choose_boxes(waypoints), CORE_FRACTION * least_clearance
+        regions = Regions(problem, swept, pairs, margin)
+        tried = [regions.around(_box(waypoints, *row)) for row in rows.tolist()]
+        free = tuple(box for box in tried if box is not None)  # Over-sweeps prove regions around their ends.
+        if 0 < len(free) == len(rows):
+            targets = (*(points[j, :2] for j in rows[:-1, 1]), problem.goal_pose[:2])
+            return Channel(free, margin, angle), targets
     return None
 
 
@@ -278,20 +280,12 @@ def _waypoints(
     return np.array(points)
 
 
-def _fastest_boxes(waypoints: Waypoints, regions: Regions) -> tuple[list[FreeBox], list[int]] | None:
-    """The fastest boxes, and the waypoint at which each of them ends; None if one is not proved free."""
-    rows = choose_boxes(waypoints)
-    boxes = [_proved(waypoints, regions, first, last, pad) for first, last, pad in rows]
-    proved = [box for box in boxes if box is not None]
-    return (proved, rows[:, 1].tolist()) if 0 < len(proved) == len(rows) else None
-
-
-def _proved(waypoints: Waypoints, regions: Regions, first: int, last: int, pad: int) -> FreeBox | None:
-    """The box of some waypoints, if over-sweeps prove a region free that holds the first and the last one."""
+def _box(waypoints: Waypoints, first: int, last: int, pad: int) -> FreeBox:
+    """The box of some waypoints with one of the paddings, before its positions are known."""
     part, width = waypoints.path[first : last + 1], waypoints.pads[pad]
     lower = np.maximum(waypoints.boxes.lower, part[:, 2:].min(axis=0) - width)
     upper = np.minimum(waypoints.boxes.upper, part[:, 2:].max(axis=0) + width)
-    return regions.around(FreeBox(Polygon(), Polygon(), lower, upper, part[:, :2].copy()))
+    return FreeBox(Polygon(), Polygon(), lower, upper, part[:, :2].copy())
 
 
 # The choice of boxes: a dynamic programme over waypoints, with the time of a box in closed form.

@@ -14,7 +14,7 @@ from shapely import Polygon
 from coop_drake.answers.limits import TeamLimits
 from coop_drake.answers.plan import Cell, MixedCell, Plan
 from coop_drake.answers.problem import PlannerSettings, PlanningProblem
-from coop_drake.answers.proof import Cut, InfeasibilityProof, OverCell, OverSlice
+from coop_drake.answers.proof import OverCell, OverSlice
 from coop_drake.laws.gains import FixedGains, GainSet
 from coop_drake.planning.cells.cells import FreeBox, Region
 from coop_drake.planning.cells.exploration import ChannelSearched, Event, SliceAdded, Watch
@@ -68,8 +68,14 @@ class Rescaling:
             return self._channel(found)
         if isinstance(found, CoveredPath):
             return self._covered(found)
-        proof = None if found.proof is None else self._proof(found.proof)
-        return replace(found, mixed=tuple(map(self._mixed, found.mixed)), proof=proof)
+        proof, mixed = (
+            found.proof,
+            [self._scaled_box(cell, self._robot_units(cell.robots), "polygon") for cell in found.mixed],
+        )
+        if proof is not None:
+            slices = tuple(map(self._slice, proof.slices))
+            proof = replace(proof, point=self.unit * proof.point, slices=slices)
+        return replace(found, mixed=tuple(mixed), proof=proof)
 
     def usual(self, found: Channel | CoveredPath) -> Channel | CoveredPath:
         """A search's result in metres, expressed in the unit."""
@@ -114,9 +120,6 @@ class Rescaling:
             transitions=transitions,
         )
 
-    def _mixed(self, cell: MixedCell) -> MixedCell:
-        return self._scaled_box(cell, self._robot_units(cell.robots), "polygon")
-
     def _covered(self, found: CoveredPath) -> CoveredPath:
         path, margin = found.path * self._units, self.unit * found.margin
 
@@ -159,21 +162,18 @@ class Rescaling:
         scaled = {name: _scaled(getattr(box, name), self.unit) for name in polygons}
         return replace(box, lower=box.lower * units, upper=box.upper * units, **scaled)  # type: ignore[arg-type]
 
-    def _proof(self, proof: InfeasibilityProof) -> InfeasibilityProof:
-        slices = tuple(map(self._slice, proof.slices))
-        return replace(proof, point=self.unit * proof.point, slices=slices)
-
     def _slice(self, part: OverSlice) -> OverSlice:
         witnesses = tuple(replace(one, polygon=self.unit * one.polygon) for one in part.witnesses)
         cells = tuple(OverCell(cell.reached, _scaled(cell.polygon, self.unit)) for cell in part.cells)
         squeezes = tuple(
-            replace(one, polygon=self.unit * one.polygon, cuts=tuple(map(self._cut, one.cuts)))
+            replace(
+                one,
+                polygon=self.unit * one.polygon,
+                cuts=tuple(replace(cut, limit=self.unit * cut.limit) for cut in one.cuts),
+            )
             for one in part.squeezes
         )
         return OverSlice(self._ends(part.lower), self._ends(part.upper), witnesses, cells, squeezes)
-
-    def _cut(self, cut: Cut) -> Cut:
-        return replace(cut, limit=self.unit * cut.limit)
 
     def _ends(self, ends: FloatArray) -> FloatArray:
         """Ends of a slice in metres; those that are limits are the limits, without rounding."""

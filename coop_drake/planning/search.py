@@ -11,9 +11,10 @@ A sampled path is then moved away from the walls and covered again at the larges
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
+from functools import cached_property
 from time import thread_time
 
 from shapely.errors import ShapelyError
@@ -162,23 +163,23 @@ class _Search:
         self._first_plan: float | None = None
         self._problem, self._progress, self._watch = problem, progress, watch
         self._samples = SampledSearch(within_limits(problem), route)
-        self._proofs = Proofs(problem, watch)
-        self._other_slices = self._narrow_attempts = 0
+        self._explored_slices = self._other_slices = self._narrow_attempts = 0
+
+    @cached_property
+    def _proofs(self) -> Proofs:
+        """Explorations; most questions need none."""
+        return Proofs(self._problem, self._watch)
 
     def run(self) -> tuple[CoveredPath | Channel | NoChannel, SearchReport]:
         """Sample, then prove and sample in turns."""
-        answer = self._answer() if self._route is None else self._routed_answer()
-        return answer, SearchReport(self._slices(), self._first_plan)
-
-    def _routed_answer(self) -> CoveredPath | NoChannel:
-        found = self._sampled(ROUTED_ATTEMPTS)
-        none = NoChannel(False, "no path along a route was found")
-        return none if found is None else self._with_margin(found)
+        return self._answer(), SearchReport(self._slices(), self._first_plan)
 
     def _answer(self) -> CoveredPath | Channel | NoChannel:
-        found = self._sampled(1)
+        found = self._sampled(1 if self._route is None else ROUTED_ATTEMPTS)
         if found is not None:
             return self._with_margin(found)
+        if self._route is not None:
+            return NoChannel(False, "no path along a route was found")
         blocked, slices = blocked_goal(self._problem)
         self._other_slices += slices
         if blocked:
@@ -200,21 +201,21 @@ class _Search:
         each, short = min(FIRST_EXPLORATION, budget), min(SHORT_EXPLORATION, budget)
         object_blocked = self._samples.object_blocked > 0
         if not object_blocked or self._explored(short, robots=0) is not Verdict.INFEASIBLE:
-            found = self._sampled(FURTHER_ATTEMPTS)
+            found = self._sampled(FURTHER_ATTEMPTS, self._proofs.blocked_part)
             object_blocked = found is None and self._samples.object_blocked >= ENOUGH_BLOCKED_ATTEMPTS
         if found is None and self._proofs.refutation is None:
             found = self._narrow(short if object_blocked else each, object_blocked)
         if found is None and object_blocked and self._proofs.refutation is None:
             self._explored(budget // OBJECT_BUDGET_DIVISOR, robots=0)
         while found is None:
-            attempts = self._attempts(ATTEMPTS_PER_ROUND)  # By what was blocked before this exploration.
+            before = self._proofs.blocked_part
             verdict = self._explored(each)
             if self._proofs.refutation is not None:
                 return self._proofs.refutation
             if verdict is Verdict.FOUND:
                 self._first_plan = thread_time() - self._began
                 return self._around(make_channel(self._problem, self._proofs.boxes(), 0.0, None))
-            found = self._first_of(attempts)
+            found = self._sampled(ATTEMPTS_PER_ROUND, before)
             if found is None and 0 < self._narrow_attempts < NARROW_ATTEMPTS:
                 found = self._narrow_sampled()
             if found is None and (verdict is Verdict.RESOLUTION or self._proofs.slices >= budget):
@@ -222,17 +223,11 @@ class _Search:
             each = min(2 * each, budget)
         return self._with_margin(found)
 
-    def _sampled(self, attempts: int) -> CoveredPath | None:
-        """Sample paths and cover them with boxes; fewer times if the object alone seems blocked."""
-        return self._first_of(self._attempts(attempts))
-
-    def _attempts(self, number: int) -> Iterator[CoveredPath | None]:
-        return self._samples.attempts(number, self._phase("sampling paths"), self._proofs.blocked_part)
-
-    def _first_of(self, attempts: Iterator[CoveredPath | None]) -> CoveredPath | None:
-        """The first boxes of some attempts; attempts end where the object alone seems blocked."""
-        self._phase("sampling paths")(0.0)
-        for found in attempts:
+    def _sampled(self, attempts: int, part: tuple[int, ...] | None = None) -> CoveredPath | None:
+        """Sample paths, of a part of the team first, and cover them; fewer times if the object is blocked."""
+        report = self._phase("sampling paths")
+        report(0.0)
+        for found in self._samples.attempts(attempts, report, part):
             if found is not None:
                 self._first_plan = thread_time() - self._began
                 return found
@@ -265,7 +260,9 @@ class _Search:
     def _explored(self, slices: int, robots: int | None = None, *, untested: bool = True) -> Verdict:
         report = self._phase("exploring slices")
         most = self._problem.settings.max_slices
-        return self._proofs.run(slices, robots, lambda count: report(count / most), untested=untested)
+        verdict = self._proofs.run(slices, robots, lambda count: report(count / most), untested=untested)
+        self._explored_slices = self._proofs.slices
+        return verdict
 
     def _with_margin(self, found: CoveredPath) -> CoveredPath:
         """The path at the largest margin that is found."""
@@ -296,7 +293,7 @@ class _Search:
         return NoChannel(False, reason, mixed=self._proofs.undecided())
 
     def _slices(self) -> int:
-        return self._other_slices + self._samples.slices + self._proofs.slices
+        return self._other_slices + self._samples.slices + self._explored_slices
 
     def _phase(self, name: str) -> Callable[[float], None]:
         """A function that reports the fraction of a phase that is done."""

@@ -17,7 +17,7 @@ from coop_drake.planning.cells.exploration import Exploration, Verdict
 from coop_drake.planning.planner import plan
 from coop_drake.planning.proofs import MANY_CORNERS, Proofs, blocked_goal, clearance_bound, refuted_at_an_end
 from coop_drake.planning.questions import relaxed
-from coop_drake.planning.sampling.sampler import inscribed_disc
+from coop_drake.planning.sampling.sampler import guiding_disc
 from coop_drake.tree.component_tree import Body, Component, ComponentTree, ConvexShape, TreeJoint
 from coop_drake.tree.pose import PlanarPose
 from coop_drake.verification import verify_proof
@@ -86,7 +86,7 @@ def test_a_corridor_narrower_than_the_object_is_refuted_by_the_object_alone() ->
 @pytest.mark.parametrize("ring", [[(0, 0), (2, 0), (2, 1), (0, 1)], [(0, 0), (3, 0), (0, 1)], [(1, 1)]])
 def test_inscribed_discs_lie_inside(ring: list[tuple[float, float]], radius: float) -> None:
     shape = ConvexShape(np.array(ring, dtype=float), radius)
-    disc = inscribed_disc(shape, 1e-4)
+    disc = guiding_disc(shape)
     if len(ring) < 3:
         assert disc.radius == radius
     else:

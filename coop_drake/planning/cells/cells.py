@@ -14,7 +14,7 @@ from coop_drake.answers.problem import PlanningProblem, goal_box
 from coop_drake.geometry.minkowski import FreeSpace, components, meet, shared, to_polygon
 from coop_drake.geometry.polygons import BoundaryDistance
 from coop_drake.geometry.sweeps import following, normals
-from coop_drake.geometry.swept_tree import BodyPair, BodyPairs, Intervals, SweptTree
+from coop_drake.geometry.swept_tree import BodyPairs, Intervals, SweptTree
 from coop_drake.planning.cells.squeezes import SqueezedPair, Squeezes
 from coop_drake.tree.component_tree import nearest_turn
 from coop_drake.tree.pose import FloatArray
@@ -130,6 +130,8 @@ class CellMaker:
         squeezing: Whether over-cells leave out where two round pieces are squeezed between walls.
 
     Attributes:
+        pairs: Self-collision of the team, as given.
+        moving_axes: For each component the axes (theta, q...) that move it; none if it has no bodies.
         squeezed: How often such a pair was found.
     """
 
@@ -142,7 +144,7 @@ class CellMaker:
         squeezing: bool = False,
     ) -> None:
         self.squeezed = 0
-        self._swept, self._pairs = swept, pairs
+        self._swept, self.pairs = swept, pairs
         self._under_space, self._over_space = FreeSpace.under(workspace), FreeSpace.over(workspace)
         squeezes = Squeezes(swept, pairs, self._over_space.edges) if squeezing else None
         self._squeezes = squeezes if squeezes is not None and squeezes.breadth > 0.0 else None
@@ -151,7 +153,7 @@ class CellMaker:
             [n for n, piece in enumerate(swept.pieces) if piece.component == c]
             for c in range(len(swept.tree.components))
         ]
-        self._axes = [swept.pieces[members[0]].axes if members else () for members in self._members]
+        self.moving_axes = [swept.pieces[members[0]].axes if members else () for members in self._members]
         self._under: dict[tuple[object, ...], CrossSection | None] = {}
         self._over: dict[tuple[object, ...], CrossSection | None] = {}
         self._cells: dict[Intervals, list[Region]] = {}
@@ -166,7 +168,7 @@ class CellMaker:
     def over_cells(self, intervals: Intervals) -> list[Region]:
         """Regions outside which no configuration of the nominal slice is free."""
         if intervals not in self._cells:  # Trial splits ask for halves that may become slices.
-            free = self._pairs.overlapping(intervals) is None
+            free = self.pairs.overlapping(intervals) is None
             found = regions_of(self._common(intervals, over=True), over=True) if free else []
             self._cells[intervals] = self.unsqueezed(intervals, found, SQUEEZE_GROWTH)[1]
         return self._cells[intervals]
@@ -195,9 +197,9 @@ class CellMaker:
 
     def under_cells(self, expanded: Intervals) -> list[Region]:
         """Regions in which every configuration of the expanded slice is free."""
-        if self._pairs.touching(expanded) is not None:
+        if self.pairs.touching(expanded) is not None:
             return []
-        regions = regions_of(self.under_region(expanded), over=False)
+        regions = regions_of(self._common(expanded, over=False), over=False)
         return [region for region in regions if region.area > NEGLIGIBLE_AREA]
 
     def guide_cells(self, intervals: Intervals) -> list[Region]:
@@ -205,23 +207,10 @@ class CellMaker:
         middle = tuple((0.5 * (lower + upper), 0.5 * (lower + upper)) for lower, upper in intervals)
         return self.under_cells(middle)
 
-    @property
-    def moving_axes(self) -> list[tuple[int, ...]]:
-        """For each component the axes (theta, q...) that move it; empty if it has no bodies."""
-        return self._axes
-
     def places_for(self, component: int, angles: Sequence[float]) -> list[Region]:
         """Positions at which one component, with bodies, is free at some angles (theta, q...)."""
         section = self._under_component(component, tuple((angle, angle) for angle in angles))
         return [] if section is None else regions_of(section, over=False)
-
-    def touching_pair(self, expanded: Intervals) -> BodyPair | None:
-        """A pair of bodies that may touch somewhere in the expanded slice; None if there is no such pair."""
-        return self._pairs.touching(expanded)
-
-    def under_region(self, expanded: Intervals) -> CrossSection:
-        """Positions at which the over-footprint touches no wall; contacts among bodies are not tested."""
-        return self._common(expanded, over=False)
 
     def _common(self, intervals: Intervals, *, over: bool) -> CrossSection:
         """Positions allowed by all components; all positions if no component restricts them."""
@@ -234,7 +223,7 @@ class CellMaker:
         return self._everywhere if region is None else region
 
     def _under_component(self, component: int, expanded: Intervals) -> CrossSection | None:
-        key = (component, *[expanded[axis] for axis in self._axes[component]])
+        key = (component, *[expanded[axis] for axis in self.moving_axes[component]])
         if key not in self._under:
             found: CrossSection | None = None
             for index in self._members[component]:
@@ -245,7 +234,7 @@ class CellMaker:
         return self._under[key]
 
     def _over_component(self, component: int, intervals: Intervals) -> CrossSection | None:
-        key = (component, *[intervals[axis] for axis in self._axes[component]])
+        key = (component, *[intervals[axis] for axis in self.moving_axes[component]])
         if key not in self._over:
             found: CrossSection | None = None
             for index in self._members[component]:

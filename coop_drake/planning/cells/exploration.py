@@ -155,7 +155,7 @@ class SplitOrder:
         """
         middle = tuple((0.5 * (lower + upper), 0.5 * (lower + upper)) for lower, upper in intervals)
         probe = self._slices.expanded(intervals) if cell.kind is Kind.GUIDE else middle
-        pair = self._maker.touching_pair(probe)
+        pair = self._maker.pairs.touching(probe)
         involved = [axis for axis in pair.axes if axis in sweeps] if pair is not None else []
         axis = max(involved, key=lambda axis: (sweeps[axis], -axis), default=None)
         too_fine = axis is None or LARGEST_CONTACT_SWEEP_RATIO * sweeps[axis] < max(sweeps.values())
@@ -490,7 +490,8 @@ class Exploration(Subdivision):
             self._add(index)
 
     def _round(self, budget: int) -> ExplorationResult | None:
-        path = self._cheapest_path()
+        starts = [cell for index in sorted(self._starts) for cell in self._starts[index]]
+        path = self.graph.cheapest(starts, {cell for cells in self._goals.values() for cell in cells})
         self._searched(path or ())
         if path is None:
             return self._result(Verdict.INFEASIBLE, ())
@@ -502,11 +503,6 @@ class Exploration(Subdivision):
         for index, axis in splits:
             self._split(index, axis)
         return None if splits else self._result(Verdict.RESOLUTION, path)
-
-    def _cheapest_path(self) -> list[GraphCell] | None:
-        starts = [cell for index in sorted(self._starts) for cell in self._starts[index]]
-        goals = {cell for cells in self._goals.values() for cell in cells}
-        return self.graph.cheapest(starts, goals)
 
     def over_leaves(self) -> dict[int, list[Region]]:
         """Over-cells of every leaf by its id; an empty list where the whole leaf is blocked."""
@@ -529,7 +525,11 @@ class Exploration(Subdivision):
         free = self.maker.under_cells(self.slices.expanded(intervals)) if mixed else []
         guide = self.maker.guide_cells(intervals) if mixed else []
         final = not self.order.splittable(intervals)
-        members = [(Kind.FREE, region, _free_weight(region)) for region in free]
+        # A FREE cell takes the time in which angles settle, and more the narrower it is.
+        members = [
+            (Kind.FREE, cell, SETTLING_TIME + TIME_PER_INVERSE_BREADTH / max(cell.breadth, LEAST_BREADTH))
+            for cell in free
+        ]
         members += [(Kind.GUIDE, region, GUIDE_WEIGHT) for region in guide if not final]
         weight = FINEST_WEIGHT if final else MIXED_WEIGHT
         members += [(Kind.MIXED, region, weight) for region in mixed]
@@ -561,8 +561,3 @@ class Exploration(Subdivision):
                 or (blocked and end_in(problem, expanded, c.region.boundary) is not None)
             ]
         self._goals[index] = ends
-
-
-def _free_weight(region: Region) -> float:
-    """Estimated time to cross a FREE cell: settling of the angles, and more the narrower the cell is [s]."""
-    return SETTLING_TIME + TIME_PER_INVERSE_BREADTH / max(region.breadth, LEAST_BREADTH)

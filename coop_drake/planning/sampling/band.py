@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from itertools import takewhile
 
 import numpy as np
+from shapely import MultiPolygon, Polygon
 
 from coop_drake.answers.problem import PlanningProblem
 from coop_drake.jit import compiled
@@ -208,23 +209,42 @@ def smoothed(
     Returns:
         The path, shape (k, 3 + n) [m, rad].
     """
+    rate = np.array([price * spacing, max(clearance - margin, 0.0) + CLEARANCE_OFFSET, FAR])
+    dense = densified(path, configuration_scale(problem.tree), spacing)
+    weights = _speeds(problem.tree)[0] / _speeds(problem.tree)
+    return improved(problem, marginal_workspace(problem, clearance), dense, rate, weights, gap, moves)
+
+
+def improved(
+    problem: PlanningProblem,
+    floor: Polygon | MultiPolygon,
+    path: FloatArray,
+    rate: FloatArray,
+    weights: FloatArray,
+    gap: float,
+    moves: int,
+    seed: int = 0,
+    *,
+    free_end: bool = True,
+) -> FloatArray:
+    """Lower the cost of a path on a floor by random moves, see ``improve``.
+
+    ``free_end``: whether it ends at the goal, where free joints may move.
+    """
     tree = problem.tree
-    scale = configuration_scale(tree)
-    team = tree.arrays
-    grid = grid_for_team(marginal_workspace(problem, clearance), team)
-    unbounded = np.full(3, np.inf)
+    team, unbounded = tree.arrays, np.full(3, np.inf)
     better: FloatArray = improve(
         team,
-        grid,
-        np.array([price * spacing, max(clearance - margin, 0.0) + CLEARANCE_OFFSET, FAR]),
-        densified(path, scale, spacing),
+        grid_for_team(floor, team),
+        rate,
+        path,
         np.concatenate((-unbounded, tree.joint_lower)),
         np.concatenate((unbounded, tree.joint_upper)),
-        scale,
-        _speeds(tree)[0] / _speeds(tree),
+        configuration_scale(tree),
+        weights,
         gap,
-        all(value is None for value in problem.goal_joints),
-        np.random.default_rng(0).random((moves, 5)),
+        free_end and all(value is None for value in problem.goal_joints),
+        np.random.default_rng(seed).random((moves, 5)),
     )
     return better
 

@@ -15,7 +15,7 @@ from coop_drake.geometry.polygons import parts_of, polygon_rings
 from coop_drake.geometry.sweeps import following
 from coop_drake.jit import compiled
 from coop_drake.planning.questions import nearby
-from coop_drake.planning.sampling.band import clearances, improve
+from coop_drake.planning.sampling.band import clearances, improved
 from coop_drake.planning.sampling.collision import densified, first_collision, grid_for_team, is_free
 from coop_drake.tree.component_tree import configuration_scale
 from coop_drake.tree.pose import FloatArray, IntArray
@@ -87,7 +87,7 @@ def wall_contacts(team: TeamArrays, path: FloatArray, edges: FloatArray, near: f
     still = np.zeros((len(path), len(edges), 2, path.shape[1]))
     ends = (np.broadcast_to(edges[:, side], (len(path), len(edges), 2)) for side in ((0, 1), (2, 3)))
     first, last = (_Vertices(end, still) for end in ends)
-    radii = _radii(team)
+    radii = np.repeat(team.radii, team.pieces[:, 2] - team.pieces[:, 1])
     ring = _ring_order(team)
     own = _Vertices(vertices.places[:, ring], vertices.changes[:, ring])
     return _joined(
@@ -128,13 +128,6 @@ def _contacts(
     changes = points.changes[k, i] - (1.0 - s) * first.changes[k, j] - s * last.changes[k, j]
     distances = (lengths - grown)[k, i, j]
     return Contacts(k, distances, np.einsum("mc,mcd->md", normals, changes))
-
-
-def _radii(team: TeamArrays) -> FloatArray:
-    """What each vertex's piece is grown by, shape (V,) [m]."""
-    counts = team.pieces[:, 2] - team.pieces[:, 1]
-    grown: FloatArray = np.repeat(team.radii, counts)
-    return grown
 
 
 def _ring_order(team: TeamArrays) -> IntArray:
@@ -191,7 +184,9 @@ def with_wider_passages(
     samples = path[chosen]
     if not len(samples):
         return path
-    walls = wall_contacts(team, samples, _edges_near(problem, samples), NEAR)
+    rings = polygon_rings(nearby(problem.workspace, samples[:, :2], tree.reach))
+    edges = np.concatenate([np.hstack((ring, following(ring))) for ring in rings])
+    walls = wall_contacts(team, samples, edges, NEAR)
     bodies = body_contacts(team, samples, NEAR)
     count, axes = samples.shape
     own, moves = np.arange(count), count * axes
@@ -211,12 +206,6 @@ def with_wider_passages(
     if solved.x is not None:
         better[chosen] += solved.x[:moves].reshape(count, axes) / scale
     return better
-
-
-def _edges_near(problem: PlanningProblem, samples: FloatArray) -> FloatArray:
-    """Edges of the floor that the team may come near, (x0, y0, x1, y1), shape (E, 4) [m]."""
-    rings = polygon_rings(nearby(problem.workspace, samples[:, :2], problem.tree.reach))
-    return np.concatenate([np.hstack((ring, following(ring))) for ring in rings])
 
 
 class _Rows:
@@ -364,23 +353,10 @@ def with_larger_least_clearance(
         seed: Seed of the random moves.
         free_end: Whether the path ends at the goal, where free joints may move.
     """
-    tree = problem.tree
-    team, scale = tree.arrays, configuration_scale(tree)
-    unbounded = np.full(3, np.inf)
-    better: FloatArray = improve(
-        team,
-        grid_for_team(problem.workspace, team),
-        np.array(PRICES),
-        path,
-        np.concatenate((-unbounded, tree.joint_lower)),
-        np.concatenate((unbounded, tree.joint_upper)),
-        scale,
-        scale,
-        LEAST_BODY_GAP,
-        free_end and all(value is None for value in problem.goal_joints),
-        np.random.default_rng(seed).random((MOVES, 5)),
+    rate, scale = np.array(PRICES), configuration_scale(problem.tree)
+    return improved(
+        problem, problem.workspace, path, rate, scale, LEAST_BODY_GAP, MOVES, seed, free_end=free_end
     )
-    return better
 
 
 def amount_needed(eased: Eased, path: FloatArray, most: float) -> tuple[float, int]:
@@ -388,19 +364,16 @@ def amount_needed(eased: Eased, path: FloatArray, most: float) -> tuple[float, i
     lower, upper, worst = 0.0, most, 0
     for _ in range(HALVINGS):
         middle = 0.5 * (lower + upper)
-        blocked = first_blocked(eased(middle), path)
+        question = eased(middle)
+        within = _within_limits(question, path)
+        count = len(path) if within.all() else int(np.argmin(within))
+        team = question.tree.arrays
+        blocked = first_collision(team, grid_for_team(question.workspace, team), path[:count], 0.0)
         if blocked < len(path):
             lower, worst = middle, blocked
         else:
             upper = middle
     return upper, worst
-
-
-def first_blocked(problem: PlanningProblem, path: FloatArray) -> int:
-    """Index of the first sample that is not within limits and free of collisions, m if all are; exact."""
-    team, within = problem.tree.arrays, _within_limits(problem, path)
-    count = len(path) if within.all() else int(np.argmin(within))
-    return first_collision(team, grid_for_team(problem.workspace, team), path[:count], 0.0)
 
 
 def are_free(problem: PlanningProblem, path: FloatArray) -> NDArray[np.bool_]:

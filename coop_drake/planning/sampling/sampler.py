@@ -96,32 +96,20 @@ class SubsystemHierarchy:
 def disc_question(question: PlanningProblem) -> PlanningProblem:
     """The question for the largest disc inside one piece of the object, a relaxation of the team."""
     bodies = [body for body in question.tree.components[0].bodies if body.robot is None]
-    discs = [_guiding_disc(shape) for body in bodies for shape in body.shapes]
+    discs = [guiding_disc(shape) for body in bodies for shape in body.shapes]
     body = Body("disc", None, (max(discs, key=lambda disc: disc.radius),))
     tree = ComponentTree((Component("disc", None, None, (body,)),), frozenset())
     return replace(question, tree=tree)
 
 
-def inscribed_disc(shape: ConvexShape, tolerance: float) -> ConvexShape:
-    """The largest disc inside a convex shape; of radius zero for a shape without interior.
-
-    Args:
-        shape: The shape.
-        tolerance: A larger disc may be larger by this much [m].
-    """
+def guiding_disc(shape: ConvexShape) -> ConvexShape:
+    """A disc inside a convex piece, a little smaller than the largest one if the piece has an interior."""
     if len(shape.vertices) < 3:
         return ConvexShape(shape.vertices.mean(axis=0, keepdims=True), shape.radius)
     ring = Polygon(shape.vertices)
-    pole = shapely.maximum_inscribed_circle(ring, tolerance=tolerance)
-    centre = np.asarray(pole.coords[0])
-    return ConvexShape(centre[None, :], float(ring.exterior.distance(Point(centre))) + shape.radius)
-
-
-def _guiding_disc(shape: ConvexShape) -> ConvexShape:
-    """A disc inside a convex piece, a little smaller than the largest one."""
-    tolerance = DISC_TOLERANCE * shapely.MultiPoint(shape.vertices).convex_hull.length
-    disc = inscribed_disc(shape, tolerance)
-    return replace(disc, radius=DISC_SHRINKAGE * (disc.radius - shape.radius) + shape.radius)
+    centre = shapely.maximum_inscribed_circle(ring, tolerance=DISC_TOLERANCE * ring.length).coords[0]
+    depth = DISC_SHRINKAGE * float(ring.exterior.distance(Point(centre)))
+    return ConvexShape(np.array([centre]), depth + shape.radius)
 
 
 COLLISION_STEP = 0.03
