@@ -134,7 +134,6 @@ class HarmonicMap:
         domain: The cell, with or without holes [m].
         goal: Point to reach, or region of the domain to collapse.
         tolerance: Largest estimated error of T that is accepted.
-        inside: A point of the piece to map where a goal region splits the domain.
         solution: The result of solving with these arguments before; None to solve.
 
     Attributes:
@@ -154,11 +153,10 @@ class HarmonicMap:
         goal: Point | Polygon,
         *,
         tolerance: float = TOLERANCE,
-        inside: Point | None = None,
         solution: Solution | None = None,
     ) -> None:
         self.goal = goal
-        self.region, self.target = region_to_map(domain, goal, inside)
+        self.region, self.target = region_to_map(domain, goal)
         self.solution = solution or _solve(outline_of(self.region, self.target), self.target, tolerance)
 
     def __call__(self, points: ArrayLike) -> tuple[FloatArray, FloatArray]:

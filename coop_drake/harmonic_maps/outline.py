@@ -12,7 +12,7 @@ from shapely import Point, Polygon
 from shapely.geometry.base import BaseGeometry
 
 from coop_drake.errors import FieldError, UnmappableError
-from coop_drake.geometry.polygons import corners_of, extent_of
+from coop_drake.geometry.polygons import corners_of, extent_of, parts_of
 from coop_drake.geometry.simplify import sharpest_angle, simplify_inward
 from coop_drake.tree.pose import ComplexArray, FloatArray, IntArray
 
@@ -52,28 +52,25 @@ def as_points(points: ArrayLike) -> FloatArray:
     return p
 
 
-def region_to_map(
-    domain: Polygon, goal: Point | Polygon, inside: Point | None = None
-) -> tuple[Polygon, Point | Polygon]:
+def region_to_map(domain: Polygon, goal: Point | Polygon) -> tuple[Polygon, Point | Polygon]:
     """F, the region to map, and the target, which its map sends to one point.
 
     A goal region that has a boundary of its own, or meets the outer ring in one arc, is taken out of the
     domain and collapses. One that meets walls otherwise (in several arcs, in a single point, at a cusp, along
     a part of a hole) cannot collapse without a wall: then the target is its pole of inaccessibility, the
-    point of it farthest from its boundary, and F is the whole domain. So it is where nothing but the goal is
-    left or the start lies in it. To reach the target is to reach the goal either way.
+    point of it farthest from its boundary, and F is the whole domain. So it is where the goal is all of the
+    domain or splits it. To reach the target is to reach the goal either way.
 
     Args:
         domain: The cell [m].
         goal: Point to reach, or region to reach.
-        inside: A point of the piece to keep where the goal splits the domain, for example the start.
 
     Returns:
         F and the target: a point, or the goal itself. Edges shorter than 1e-7 times the domain's size, whose
         ends are hardly more than rounding, are left out, inward.
 
     Raises:
-        FieldError: If the domain is no valid polygon, the goal is not in it, or the piece is undetermined.
+        FieldError: If the domain is no valid polygon, or the goal is not in it.
     """
     _check_polygon(domain, "domain")
     if isinstance(goal, Point):
@@ -89,9 +86,10 @@ def region_to_map(
         domain = simplify_inward(domain, tiny)
     if isinstance(goal, Point):
         return domain, Point(goal.x, goal.y) if goal.has_z else goal
-    piece = _piece_to_keep(domain, goal, inside)
-    if piece is not None and _can_collapse(domain, piece, goal):
-        return piece, goal
+    least = _SLIVER * extent_of(domain)
+    pieces = [part for part in parts_of(domain.difference(goal)) if part.area > least * part.length]
+    if len(pieces) == 1 and _can_collapse(domain, pieces[0], goal):
+        return pieces[0], goal
     from coop_drake.geometry.passage import pole  # loads scipy's Voronoi diagrams, which few goals need
 
     return domain, Point(pole(goal)[0])
@@ -112,27 +110,6 @@ def _extent(domain: Polygon) -> str:
     """Where the domain is, in words."""
     x0, y0, x1, y1 = domain.bounds
     return f", which spans x {x0:.6g} to {x1:.6g} and y {y0:.6g} to {y1:.6g} m and may have holes"
-
-
-def _piece_to_keep(domain: Polygon, goal: Polygon, inside: Point | None) -> Polygon | None:
-    """The piece of the domain less the goal that holds a point, or the only one; None within the goal.
-
-    Raises:
-        FieldError: If the point is needed but missing, or outside the domain.
-    """
-    least = _SLIVER * extent_of(domain)
-    parts = shapely.get_parts(domain.difference(goal))
-    pieces = [p for p in parts if isinstance(p, Polygon) and p.area > least * p.length]
-    if inside is None and len(pieces) > 1:
-        raise FieldError(
-            f"the goal region splits the domain into {len(pieces)} pieces: the argument `inside`, a point of "
-            "the piece to map, is needed"
-        )
-    if inside is not None:
-        if not domain.covers(inside):
-            raise FieldError(f"`inside`, {inside.wkt}, is outside the domain{_extent(domain)}")
-        pieces = [p for p in pieces if p.covers(inside)]
-    return pieces[0] if pieces else None
 
 
 def _can_collapse(domain: Polygon, piece: Polygon, goal: Polygon) -> bool:

@@ -12,8 +12,8 @@ from tests.support import domains
 ROOM = box(0, 0, 4, 2)
 
 
-def outline(domain, goal, inside=None):
-    return outline_of(*region_to_map(domain, goal, inside))
+def outline(domain, goal):
+    return outline_of(*region_to_map(domain, goal))
 
 
 def test_angles_are_linear_in_arc_length():
@@ -88,40 +88,36 @@ FRAME = box(0.5, 0.2, 3.5, 1.8).difference(box(1, 0.6, 3, 1.4))
 POSTS = box(1.9, 0.5, 2.1, 0.7).union(box(1.9, 1.3, 2.1, 1.5))
 
 COLLAPSING = {
-    "in the interior": (ROOM, box(2.5, 0.5, 3.3, 1.2), None),
-    "one arc of the ring": (ROOM, box(3, 1.5, 4, 2), None),
-    "around a corner": (ROOM, box(3, 0, 4, 2).union(box(0, 1.5, 4, 2)), None),
-    "a splitting one": (ROOM, box(1.5, 0, 2, 2), Point(0.5, 1)),
-    "all round a hole": (WITH_CRATE, CRATE.buffer(0.3).difference(CRATE), None),
-    "a frame from outside": (ROOM, FRAME, Point(0.2, 1)),
-    "a millimetre large": (
-        affinity.scale(ROOM, 1e-3, 1e-3, origin=(0, 0)),
-        affinity.scale(box(3, 1.5, 4, 2), 1e-3, 1e-3, origin=(0, 0)),
-        None,
+    "in the interior": (ROOM, box(2.5, 0.5, 3.3, 1.2)),
+    "one arc of the ring": (ROOM, box(3, 1.5, 4, 2)),
+    "around a corner": (ROOM, box(3, 0, 4, 2).union(box(0, 1.5, 4, 2))),
+    "all round a hole": (WITH_CRATE, CRATE.buffer(0.3).difference(CRATE)),
+    "a millimetre large": tuple(
+        affinity.scale(shape, 1e-3, 1e-3, origin=(0, 0)) for shape in (ROOM, box(3, 1.5, 4, 2))
     ),
 }
 THROUGH_THE_POLE = {
-    "touching in a point": (ROOM, Polygon([(2, 0), (2.5, 0.5), (1.5, 0.5)]), None),
-    "tangent to the wall": (ROOM, Point(2, 0.5).buffer(0.5, quad_segs=16), None),
-    "a hair off the wall": (ROOM, box(2, 1e-5, 3, 1), None),
-    "a frame from inside": (ROOM, FRAME, Point(1.5, 1)),
-    "two arcs": (ROOM.difference(POSTS), FRAME.difference(POSTS), Point(1.5, 1)),
-    "part of a hole": (WITH_CRATE, box(2.5, 0.8, 3, 1.2), None),
-    "a hole and the wall": (WITH_CRATE, box(1.8, 1.3, 2.2, 2), None),
-    "a hole's corner": (WITH_CRATE, Polygon([(2.5, 0.7), (3, 0.3), (3, 0.7)]), None),
-    "the whole domain": (ROOM, ROOM, None),
-    "a start within it": (ROOM, box(1, 0, 2, 2), Point(1.5, 1)),
-    "a cusp against the wall": (ROOM, Polygon([(1, 0.04), (4, 0), (4, 1), (2, 1)]), None),
+    "touching in a point": (ROOM, Polygon([(2, 0), (2.5, 0.5), (1.5, 0.5)])),
+    "tangent to the wall": (ROOM, Point(2, 0.5).buffer(0.5, quad_segs=16)),
+    "a hair off the wall": (ROOM, box(2, 1e-5, 3, 1)),
+    "a frame": (ROOM, FRAME),
+    "two arcs": (ROOM.difference(POSTS), FRAME.difference(POSTS)),
+    "part of a hole": (WITH_CRATE, box(2.5, 0.8, 3, 1.2)),
+    "a hole and the wall": (WITH_CRATE, box(1.8, 1.3, 2.2, 2)),
+    "a hole's corner": (WITH_CRATE, Polygon([(2.5, 0.7), (3, 0.3), (3, 0.7)])),
+    "the whole domain": (ROOM, ROOM),
+    "a splitting one": (ROOM, box(1, 0, 2, 2)),
+    "a cusp against the wall": (ROOM, Polygon([(1, 0.04), (4, 0), (4, 1), (2, 1)])),
 }
 
 
 @pytest.mark.parametrize("name", COLLAPSING)
 def test_a_goal_clear_of_walls_or_on_one_arc_collapses(name):
-    domain, goal, inside = COLLAPSING[name]
-    region, target = region_to_map(domain, goal, inside)
+    domain, goal = COLLAPSING[name]
+    region, target = region_to_map(domain, goal)
     assert target is goal
     assert region.intersection(goal).area == pytest.approx(0.0, abs=1e-9 * domain.area)
-    harmonic_map = HarmonicMap(domain, goal, inside=inside, tolerance=1e-6)
+    harmonic_map = HarmonicMap(domain, goal, tolerance=1e-6)
     shared = region.exterior.intersection(goal.exterior).length > 0.0
     assert np.hypot(*harmonic_map.goal_image) <= 1.0 + 1e-12
     assert bool(np.hypot(*harmonic_map.goal_image) > 1.0 - 1e-9) is shared
@@ -129,8 +125,8 @@ def test_a_goal_clear_of_walls_or_on_one_arc_collapses(name):
 
 @pytest.mark.parametrize("name", [*COLLAPSING, *THROUGH_THE_POLE])
 def test_every_goal_is_reached(name):
-    domain, goal, inside = {**COLLAPSING, **THROUGH_THE_POLE}[name]
-    harmonic_map = HarmonicMap(domain, goal, inside=inside, tolerance=1e-6)
+    domain, goal = {**COLLAPSING, **THROUGH_THE_POLE}[name]
+    harmonic_map = HarmonicMap(domain, goal, tolerance=1e-6)
     starts = domains.inside(harmonic_map.region, 60)
     streamlines = trace_streamlines(VelocityField(harmonic_map), starts)
     assert len(starts) > 10
@@ -140,48 +136,40 @@ def test_every_goal_is_reached(name):
 
 @pytest.mark.parametrize("name", THROUGH_THE_POLE)
 def test_any_other_goal_is_reached_through_its_pole(name):
-    domain, goal, inside = THROUGH_THE_POLE[name]
-    region, target = region_to_map(domain, goal, inside)
+    domain, goal = THROUGH_THE_POLE[name]
+    region, target = region_to_map(domain, goal)
     assert region is domain
     assert goal.contains(target)
-    harmonic_map = HarmonicMap(domain, goal, inside=inside, tolerance=1e-6)
+    harmonic_map = HarmonicMap(domain, goal, tolerance=1e-6)
     np.testing.assert_array_equal(harmonic_map.goal_image, harmonic_map(target.coords[0])[0])
 
 
 @pytest.mark.parametrize(
-    ("domain", "goal", "inside", "message"),
+    ("domain", "goal", "message"),
     [
-        (ROOM, Point(5, 1), None, "must lie strictly inside the domain, which spans x 0 to 4"),
-        (ROOM, Point(4, 1), None, "must lie strictly inside the domain"),
-        (ROOM, Point(np.nan, 1), None, "must lie strictly inside the domain"),
-        (ROOM, Point(), None, "must lie strictly inside the domain"),
-        (WITH_CRATE, Point(2, 1), None, "may have holes"),
-        (ROOM, box(3, 0, 5, 2), None, "goal region must lie in the domain; intersect it"),
-        (ROOM, Polygon(), None, "the goal region must be one valid polygon with an area, got an empty one"),
-        (ROOM, (1.0, 1.0), None, "must be a shapely Point or Polygon, got tuple"),
-        (ROOM, MultiPolygon([box(0, 0, 1, 1), box(2, 0, 3, 1)]), None, "got MultiPolygon; take one of its"),
-        ([(0, 0), (1, 0), (0, 1)], Point(0.2, 0.2), None, "the domain must be a shapely Polygon, got list"),
-        (Polygon(), Point(0, 0), None, "the domain must be one valid polygon with an area, got an empty"),
-        (Polygon([(0, 0), (1, 1), (1, 0), (0, 1)]), Point(0.5, 0.2), None, "Self-intersection"),
-        (ROOM, box(1, 0, 2, 2), None, "splits the domain into 2 pieces: the argument `inside`"),
-        (ROOM, box(1, 0, 2, 2), Point(5, 1), r"`inside`, POINT \(5 1\), is outside the domain"),
+        (ROOM, Point(5, 1), "must lie strictly inside the domain, which spans x 0 to 4"),
+        (ROOM, Point(4, 1), "must lie strictly inside the domain"),
+        (ROOM, Point(np.nan, 1), "must lie strictly inside the domain"),
+        (ROOM, Point(), "must lie strictly inside the domain"),
+        (WITH_CRATE, Point(2, 1), "may have holes"),
+        (ROOM, box(3, 0, 5, 2), "goal region must lie in the domain; intersect it"),
+        (ROOM, Polygon(), "the goal region must be one valid polygon with an area, got an empty one"),
+        (ROOM, (1.0, 1.0), "must be a shapely Point or Polygon, got tuple"),
+        (ROOM, MultiPolygon([box(0, 0, 1, 1), box(2, 0, 3, 1)]), "got MultiPolygon; take one of its"),
+        ([(0, 0), (1, 0), (0, 1)], Point(0.2, 0.2), "the domain must be a shapely Polygon, got list"),
+        (Polygon(), Point(0, 0), "the domain must be one valid polygon with an area, got an empty"),
+        (Polygon([(0, 0), (1, 1), (1, 0), (0, 1)]), Point(0.5, 0.2), "Self-intersection"),
     ],
 )
-def test_unusable_questions_are_refused(domain, goal, inside, message):
+def test_unusable_questions_are_refused(domain, goal, message):
     with pytest.raises(FieldError, match=message):
-        HarmonicMap(domain, goal, inside=inside)
+        HarmonicMap(domain, goal)
 
 
 @pytest.mark.filterwarnings("ignore:invalid value encountered")
 def test_a_coordinate_that_is_no_number_is_refused():
     with pytest.raises(FieldError, match="Invalid Coordinate"):
         HarmonicMap(Polygon([(0, 0), (1, 0), (np.nan, 1)]), Point(0.2, 0.2))
-
-
-def test_inside_selects_the_piece_of_a_split_domain():
-    goal = box(1, 0, 2, 2)
-    assert region_to_map(ROOM, goal, Point(0.5, 1))[0].area == pytest.approx(2)
-    assert region_to_map(ROOM, goal, Point(3, 1))[0].area == pytest.approx(4)
 
 
 @pytest.mark.parametrize(
