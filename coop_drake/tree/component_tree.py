@@ -225,26 +225,7 @@ class ComponentTree:
     @cached_property
     def reach(self) -> float:
         """Upper bound on the distance of any footprint point from the object's origin [m]."""
-        return max(self._component_reach(index) for index in range(len(self.components)))
-
-    def _component_reach(self, index: int) -> float:
-        component = self.components[index]
-        own = max(
-            (
-                hypot(*vertex) + shape.radius
-                for body in component.bodies
-                for shape in body.shapes
-                for vertex in shape.vertices
-            ),
-            default=0.0,
-        )
-        for ancestor in self.ancestors[index]:
-            joint = self.components[ancestor].joint
-            if joint is not None:
-                slide = hypot(*joint.axis) * max(abs(joint.lower), abs(joint.upper))
-                slide = slide if joint.kind == "prismatic" else 0.0
-                own += hypot(joint.X_PJ.x, joint.X_PJ.y) + slide
-        return own
+        return axis_levers(self)[0]
 
 
 # Circular axes: theta and every joint without limits, on which values that differ by whole turns are one.
@@ -307,30 +288,28 @@ def axis_levers(tree: ComponentTree) -> tuple[float, ...]:
 
     In m/rad for an angle; without a unit for a prismatic joint.
     """
-    reaches = [0.0] * len(tree.components)
-    levers = [0.0] * (1 + len(tree.joints))
-    for index in range(len(tree.components) - 1, -1, -1):
-        component = tree.components[index]
-        own = max(
-            (
-                float((shape.vertices**2).sum(axis=1).max() ** 0.5) + shape.radius
-                for body in component.bodies
-                for shape in body.shapes
-            ),
-            default=0.0,
-        )
-        reaches[index] = max(reaches[index], own)
-        joint = component.joint
-        if joint is None or component.parent is None:
-            levers[0] = reaches[index]
+    pieces = [[shape for body in component.bodies for shape in body.shapes] for component in tree.components]
+    reaches = [
+        max((float((s.vertices**2).sum(axis=1).max() ** 0.5) + s.radius for s in shapes), default=0.0)
+        for shapes in pieces
+    ]
+    levers = [_levers(tree, component, reach) for component, reach in enumerate(reaches)]
+    return tuple(np.max(levers, axis=0).tolist())
+
+
+def _levers(tree: ComponentTree, component: int, reach: float) -> FloatArray:
+    """As ``point_levers``, for all points of a component within a reach of its origin [m]."""
+    levers = np.zeros(1 + len(tree.joints))
+    for index in tree.ancestors[component]:
+        joint = tree.components[index].joint
+        if joint is None:
+            levers[0] = reach
             continue
-        length = (joint.axis[0] ** 2 + joint.axis[1] ** 2) ** 0.5
-        revolute = joint.kind == "revolute"
-        levers[1 + joint.index] = reaches[index] if revolute else length
-        slide = 0.0 if revolute else length * max(abs(joint.lower), abs(joint.upper))
-        offset = (joint.X_PJ.x**2 + joint.X_PJ.y**2) ** 0.5
-        reaches[component.parent] = max(reaches[component.parent], offset + slide + reaches[index])
-    return tuple(levers)
+        along, revolute = (joint.axis[0] ** 2 + joint.axis[1] ** 2) ** 0.5, joint.kind == "revolute"
+        levers[1 + joint.index] = reach if revolute else along
+        slide = 0.0 if revolute else along * max(abs(joint.lower), abs(joint.upper))
+        reach += slide + (joint.X_PJ.x**2 + joint.X_PJ.y**2) ** 0.5
+    return levers
 
 
 def configuration_scale(tree: ComponentTree) -> FloatArray:
@@ -353,17 +332,7 @@ def point_levers(tree: ComponentTree, component: int, point: tuple[float, float]
         Shape (1 + n,), in m/rad for an angle and without a unit for a prismatic joint; 0 for joints that do
         not move the point.
     """
-    levers, reach = np.zeros(1 + len(tree.joints)), hypot(*point)
-    for index in tree.ancestors[component]:
-        joint = tree.components[index].joint
-        if joint is None:
-            levers[0] = reach
-            continue
-        along = hypot(*joint.axis)
-        levers[1 + joint.index] = reach if joint.kind == "revolute" else along
-        slide = 0.0 if joint.kind == "revolute" else along * max(abs(joint.lower), abs(joint.upper))
-        reach += slide + hypot(joint.X_PJ.x, joint.X_PJ.y)
-    return levers
+    return _levers(tree, component, hypot(*point))
 
 
 def turn_levers(tree: ComponentTree, component: int) -> FloatArray:
