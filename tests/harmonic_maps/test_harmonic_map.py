@@ -1,5 +1,7 @@
 """Maps beside other solvers and known ones; their accuracy, near walls too, and what is refused."""
 
+from __future__ import annotations
+
 from itertools import pairwise
 
 import numpy as np
@@ -14,9 +16,90 @@ from coop_drake.harmonic_maps.pictures import sample_boundary
 from tests.support import domains
 from tests.support.domains import inside
 from tests.support.lightning import Lightning
-from tests.support.real_cells import REAL_CELLS
-from tests.support.rectangle_map import rectangle_map
 from tests.support.single_layer import SingleLayer
+
+# The harmonic map of a rectangle by separation of variables: exact up to the truncated series.
+
+
+def rectangle_map(width: float, height: float, points: np.ndarray, *, terms: int = 400) -> np.ndarray:
+    """T at interior points (n, 2) of [0, width] x [0, height], the boundary angle 0 at the origin.
+
+    The series of each side decays like exp(-n pi distance / side) in the distance from that side.
+    """
+    x, y = points.T
+    rate = np.pi / (width + height)
+    T = np.zeros(len(points), dtype=complex)
+    # Side, its length, its angle at the start, coordinate along it, distance from it, extent across it.
+    sides = (
+        (width, 0.0, x, y, height),
+        (height, rate * width, y, width - x, width),
+        (width, np.pi, width - x, height - y, height),
+        (height, np.pi + rate * width, height - y, x, width),
+    )
+    n = np.arange(1, terms + 1)[:, None]
+    for length, start, along, across, extent in sides:
+        k = n * np.pi / length
+        # 2/L times the integral over (0, L) of exp(i (start + rate s)) sin(k s).
+        coefficient = 2 / length * np.exp(1j * start) * k * (1 - (-1.0) ** n * np.exp(1j * rate * length))
+        coefficient = coefficient / (k**2 - rate**2)
+        decay = np.exp(-k * across) * (1 - np.exp(-2 * k * (extent - across))) / (1 - np.exp(-2 * k * extent))
+        T += (coefficient * np.sin(k * along) * decay).sum(axis=0)
+    return np.column_stack((T.real, T.imag))
+
+
+# Cells of plans that were hardest to map: narrow, with short edges and corners of every angle.
+
+NEXT_TO_THE_GOAL = (
+    Polygon([
+        (4.20956, 0.95223), (4.20956, 1.36779), (4.60223, 1.51809), (5.02729, 1.51809),
+        (5.02729, 1.64838), (5.03998, 1.70434), (5.34027, 1.91319), (5.68565, 2.03363),
+        (6.05345, 2.03363), (6.06073, 2.05088), (6.1379, 2.10455), (6.1379, 2.29432),
+        (6.48599, 2.55223), (6.70956, 2.55223), (6.70956, 7.0961), (5.37037, 7.0961),
+        (5.37037, 2.26008), (4.97772, 2.10979), (4.47271, 2.10979), (4.47271, 1.95162),
+        (4.46002, 1.89566), (4.15973, 1.68681), (3.81435, 1.56637), (3.46407, 1.56637),
+        (3.43161, 1.5438), (3.43161, 1.35403), (3.08351, 1.0961), (2.03506, 1.0961),
+        (1.88438, 1.29946), (1.80113, 1.45793), (1.73141, 1.64006), (1.70956, 1.75533),
+        (1.70956, 4.893), (1.37037, 4.76581), (1.37037, 0.95223),
+    ]),
+    Point(6, 6),
+)  # fmt: skip
+
+LONG_WAY_ROUND = (
+    Polygon([
+        (3.9684, 1.52936), (3.72167, 1.52936), (3.44906, 1.15202), (2.44695, 1.15202),
+        (2.32427, 1.24065), (2.2208, 1.35351), (2.12897, 1.47604), (2.0649, 1.61213),
+        (2.0649, 4.96894), (1.7684, 4.82936), (1.42999, 4.70245), (1.24906, 4.45202),
+        (1.11605, 4.40214), (1.11605, 1.0101), (4.5649, 1.0101), (4.5649, 1.21504),
+        (4.98109, 1.41097), (5.02453, 1.42037), (5.02453, 1.646), (5.22807, 1.92775),
+        (5.5316, 2.07064), (5.79067, 2.07064), (5.86354, 2.18859), (6.16806, 2.6101),
+        (6.67474, 2.6101), (6.86994, 2.45642), (7.0382, 2.23567), (7.0649, 2.24469),
+        (7.0649, 7.15202), (5.11605, 7.15202), (5.11605, 2.47015), (4.64558, 2.24866),
+        (4.47547, 2.17963), (4.47547, 1.954), (4.27193, 1.67225),
+    ]),
+    Point(6, 6),
+)  # fmt: skip
+
+TWO_ROOMS = (
+    Polygon([
+        (4.75219, 6.04268), (4.76621, 6.0378), (4.89787, 5.91524), (4.9303, 5.81164),
+        (4.9303, 5.34465), (4.90395, 5.25712), (4.84778, 5.18902), (4.97065, 5.09758),
+        (5.10228, 5.0714), (5.23391, 5.09758), (5.3455, 5.17214), (5.42006, 5.28373),
+        (5.46705, 5.43912), (5.46296, 5.61024), (5.46296, 5.98529), (5.3481, 5.99791),
+        (5.30782, 6.02968), (5.29938, 6.77724), (5.34549, 7.19715), (5.38869, 7.22483),
+        (5.54096, 7.22655), (5.54096, 7.59939), (5.55822, 7.60066), (5.55822, 7.63774),
+        (5.60491, 7.6782), (5.60491, 7.87518), (5.63967, 7.96342), (5.71194, 8.0429),
+        (5.81578, 8.08078), (5.92962, 8.08078), (5.89434, 8.25815), (5.75675, 8.46408),
+        (5.55082, 8.60167), (5.30792, 8.64998), (5.06502, 8.60167), (4.8591, 8.46408),
+        (4.80395, 8.35712), (4.72125, 8.25684), (4.68591, 8.07918), (4.86519, 8.03468),
+        (4.95886, 7.96915), (5.02586, 7.86979), (5.08936, 7.69568), (5.08936, 7.20812),
+        (5.0602, 7.1125), (5.13165, 7.06476), (5.11214, 6.80495), (4.92812, 6.24394),
+        (4.84643, 6.18936),
+    ]),
+    Point(5, 8),
+)  # fmt: skip
+
+REAL_CELLS = {"next to the goal": NEXT_TO_THE_GOAL, "long way round": LONG_WAY_ROUND, "two rooms": TWO_ROOMS}
+
 
 NAMED = {
     "square": domains.square(),
