@@ -215,7 +215,7 @@ def test_ends_outside_the_channel_are_refused(change, message):
 
 @pytest.fixture(scope="module")
 def base_channel():
-    problem = case("base_channel")
+    problem = case("base")
     channel, _ = find_channel(problem)
     return problem, turned_to_start(problem, channel)
 
