@@ -238,7 +238,7 @@ def _refine(
     return refined, incoming
 
 
-@compiled(reassociate=True)
+@compiled
 def _subtract(
     m: FlatMap, edge: IntArray, coefficients: FloatArray,
     target: ComplexArray, target_edge: IntArray, target_corner: IntArray, out: FloatArray,
@@ -361,7 +361,7 @@ def _grown(m: MapArrays, *, opened: bool) -> MapArrays:
     )
 
 
-@compiled(reassociate=True)
+@compiled
 def _sort_out(
     m: FlatMap, opened: bool, square: FloatArray, state: IntArray, series: FloatArray,
     start: IntArray, near: IntArray, nodes: FloatArray, todo: IntArray,
@@ -428,7 +428,7 @@ def _sort_out(
     return first, kept[:end], gain
 
 
-@compiled(reassociate=True, borrows=True)
+@compiled(borrows=True)
 def _gain(m: FlatMap, near: IntArray, first: int, last: int, x: float, y: float, radius: float) -> int:
     """How many of the sources near a box a division may remove: those that are shorter than the box.
 
@@ -449,7 +449,7 @@ def _gain(m: FlatMap, near: IntArray, first: int, last: int, x: float, y: float,
     return gain
 
 
-@compiled(reassociate=True, borrows=True)
+@compiled(borrows=True)
 def _expand(nodes: FloatArray, count: int, radius: float, series: FloatArray, box: int) -> None:
     """Add nodes to the series of a box, in units of its radius: real and imaginary parts for u, then for v.
 
@@ -479,7 +479,7 @@ def _expand(nodes: FloatArray, count: int, radius: float, series: FloatArray, bo
         series[box, degree, 3] += d
 
 
-@compiled(reassociate=True, borrows=True)
+@compiled(borrows=True)
 def _shift(series: FloatArray, shifts: FloatArray) -> None:
     """Shift series, four for each box, to its quarters, whose centres are ``shifts`` (4, 2) radii away."""
     n = series.shape[1]

@@ -129,25 +129,25 @@ def unflatten(flat: FlatMap) -> MapArrays:
     return MapArrays(*arrays)
 
 
-@compiled(reassociate=True, borrows=True)
+@compiled(borrows=True)
 def row(flat: FlatMap, array: int, k: int, width: int) -> int:
     """Where row k of an array begins, whose rows hold ``width`` numbers."""
     return int(flat[_HEAD + array * _ENTRY]) + k * width
 
 
-@compiled(reassociate=True, borrows=True)
+@compiled(borrows=True)
 def rows_of(flat: FlatMap, array: int) -> int:
     """How many rows an array has."""
     return int(flat[_HEAD + array * _ENTRY + 1])
 
 
-@compiled(reassociate=True, borrows=True)
+@compiled(borrows=True)
 def integer(flat: FlatMap, array: int, k: int, width: int, column: int) -> int:
     """The integer in row k and a column of an array whose rows hold ``width`` numbers."""
     return int(flat[row(flat, array, k, width) + column])
 
 
-@compiled(reassociate=True, borrows=True)
+@compiled(borrows=True)
 def is_inside(numbers: FloatArray, first: int, count: int, x: float, y: float) -> bool:
     """Whether a point is inside, by the number of walls that a ray to the right crosses.
 
@@ -160,7 +160,7 @@ def is_inside(numbers: FloatArray, first: int, count: int, x: float, y: float) -
     return inside
 
 
-@compiled(reassociate=True, borrows=True)
+@compiled(borrows=True)
 def nearest_on_walls(numbers: FloatArray, first: int, count: int, x: float, y: float) -> tuple[float, float]:
     """The point of the walls that is nearest to a point; arguments as in `is_inside`."""
     best, bx, by = np.inf, x, y
@@ -179,14 +179,14 @@ Sums = tuple[float, float, float, float, float, float, float, float]
 point is where two panels meet, otherwise (0, 0)."""
 
 
-@compiled(reassociate=True)
+@compiled
 def _add(a: Sums, b: Sums) -> Sums:
     """Sum of two contributions."""
     (a0, a1, a2, a3, a4, a5, a6, a7), (b0, b1, b2, b3, b4, b5, b6, b7) = a, b
     return a0 + b0, a1 + b1, a2 + b2, a3 + b3, a4 + b4, a5 + b5, a6 + b6, a7 + b7
 
 
-@compiled(reassociate=True, borrows=True)
+@compiled(borrows=True)
 def _density_of(m: FlatMap, k: int, place: int, level: int) -> int:
     """Where the density of panel (k, place, level) stands: values, then Legendre coefficients."""
     index = place
@@ -195,7 +195,7 @@ def _density_of(m: FlatMap, k: int, place: int, level: int) -> int:
     return row(m, DENSITIES, index, 4 * REFINED_NODES)
 
 
-@compiled(reassociate=True, borrows=True)
+@compiled(borrows=True)
 def panel_ends(
     m: FlatMap, k: int, place: int, level: int, x: float, y: float, rx: float, ry: float
 ) -> tuple[float, float, float, float]:
@@ -221,7 +221,7 @@ def panel_ends(
     return ax, ay, bx, by
 
 
-@compiled(reassociate=True)
+@compiled
 def _panel_sums(
     m: FlatMap, k: int, place: int, level: int, x: float, y: float, rx: float, ry: float, rounding: float
 ) -> Sums:
@@ -262,7 +262,7 @@ def _panel_sums(
     )  # fmt: skip
 
 
-@compiled(reassociate=True, borrows=True)
+@compiled(borrows=True)
 def _gauss(m: FlatMap, values: int, zx: float, zy: float) -> tuple[float, float, float, float, float, float]:
     """Imaginary parts of the two integrals, real and imaginary parts of their derivatives, by quadrature."""
     tu, tv, ru, iu, rv, iv = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
@@ -281,7 +281,7 @@ def _gauss(m: FlatMap, values: int, zx: float, zy: float) -> tuple[float, float,
     return tu, tv, ru, iu, rv, iv
 
 
-@compiled(reassociate=True, borrows=True)
+@compiled(borrows=True)
 def _legendre(
     m: FlatMap, coefficients: int, zeta: complex, q0: complex, d0: complex
 ) -> tuple[float, float, float, float, float, float]:
@@ -303,7 +303,7 @@ def _legendre(
     return -2.0 * tu, -2.0 * tv, -2.0 * du.real, -2.0 * du.imag, -2.0 * dv.real, -2.0 * dv.imag
 
 
-@compiled(reassociate=True, borrows=True)
+@compiled(borrows=True)
 def _tail(m: FlatMap, k: int, level: int, rx: float, ry: float) -> Sums:
     """The legs of corner k from a level down, seen from afar, through their compressed density."""
     tu, tv, xu, yu, xv, yv = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
@@ -331,13 +331,13 @@ def _tail(m: FlatMap, k: int, level: int, rx: float, ry: float) -> Sums:
     return tu, tv, xu, yu, xv, yv, 0.0, 0.0
 
 
-@compiled(reassociate=True, borrows=True)
+@compiled(borrows=True)
 def _vertex_radius(m: FlatMap, k: int, rounding: float) -> float:
     """Distance from a vertex below which points count as the vertex [m]."""
     return max(2.0 * float(m[row(m, CORNERS, k, 15) + 8]) * 0.5**LEVELS, 4.0 * rounding)
 
 
-@compiled(reassociate=True, borrows=True)
+@compiled(borrows=True)
 def _is_at_vertex(m: FlatMap, k: int, x: float, y: float, rounding: float) -> bool:
     """Whether a point counts as the vertex of a corner."""
     corner, radius = row(m, CORNERS, k, 15), _vertex_radius(m, k, rounding)
@@ -345,7 +345,7 @@ def _is_at_vertex(m: FlatMap, k: int, x: float, y: float, rounding: float) -> bo
     return bool(rx * rx + ry * ry < radius * radius)
 
 
-@compiled(reassociate=True)
+@compiled
 def _corner_sums(m: FlatMap, k: int, level: int, x: float, y: float, rounding: float) -> Sums:
     """Field of one corner from a level down, at a point not far from it; at the vertex, just inside of it."""
     corner = row(m, CORNERS, k, 15)
@@ -363,7 +363,7 @@ def _corner_sums(m: FlatMap, k: int, level: int, x: float, y: float, rounding: f
     return _add(total, _tail(m, k, level, rx, ry))
 
 
-@compiled(reassociate=True, borrows=True)
+@compiled(borrows=True)
 def seen_from(m: FlatMap, k: int, place: int, level: int, x: float, y: float) -> tuple[float, float, float]:
     """How a source is seen from a point [m].
 
@@ -385,7 +385,7 @@ def seen_from(m: FlatMap, k: int, place: int, level: int, x: float, y: float) ->
     return nearest, np.sqrt(rx * rx + ry * ry), leg
 
 
-@compiled(reassociate=True, borrows=True)
+@compiled(borrows=True)
 def solved_nodes(m: FlatMap, k: int, place: int) -> tuple[int, int]:
     """Index range [first, end) of the solved nodes of a regular panel or of a corner's block."""
     if k >= 0:
@@ -395,13 +395,13 @@ def solved_nodes(m: FlatMap, k: int, place: int) -> tuple[int, int]:
     return regular + place * count, regular + (place + 1) * count
 
 
-@compiled(reassociate=True, borrows=True)
+@compiled(borrows=True)
 def _row_length(m: FlatMap) -> int:
     """Number of solved nodes: the length of each of the six rows of sources."""
     return (row(m, CORNERS, 0, 15) - row(m, SOURCES, 0, 0)) // 6
 
 
-@compiled(reassociate=True, borrows=True)
+@compiled(borrows=True)
 def gather(
     m: FlatMap, k: int, place: int, level: int, opened: bool, seen: tuple[float, float, float],
     x: float, y: float, radius: float, nodes: FloatArray,
@@ -434,7 +434,7 @@ def gather(
     return REFINED_NODES
 
 
-@compiled(reassociate=True, borrows=True)
+@compiled(borrows=True)
 def _gather_tail(m: FlatMap, k: int, level: int, x: float, y: float, nodes: FloatArray) -> int:
     """Write the nodes of a corner's compressed density at a level, its vertex at (x, y); return how many."""
     n, grid = integer(m, CORNER_INDEX, k, 7, 2), row(m, GRID, integer(m, CORNER_INDEX, k, 7, 3), 2)
@@ -450,7 +450,7 @@ def _gather_tail(m: FlatMap, k: int, level: int, x: float, y: float, nodes: Floa
     return 2 * n
 
 
-@compiled(reassociate=True, borrows=True)
+@compiled(borrows=True)
 def leaf_at(m: FlatMap, x: float, y: float) -> int:
     """Index of the leaf that holds a point."""
     root = row(m, ROOT, 0, 3)
@@ -464,7 +464,7 @@ def leaf_at(m: FlatMap, x: float, y: float) -> int:
     return -1 - box
 
 
-@compiled(reassociate=True, borrows=True)
+@compiled(borrows=True)
 def far_field(m: FlatMap, leaf: int, x: float, y: float) -> Sums:
     """The series of a leaf at a point: both sums and their derivatives, by Horner's rule."""
     square, series = row(m, LEAF_SQUARE, leaf, 3), row(m, LOCAL, leaf, 4 * ORDER)
@@ -481,7 +481,7 @@ def far_field(m: FlatMap, leaf: int, x: float, y: float) -> Sums:
     return ui, vi, dui * inverse, dur * inverse, dvi * inverse, dvr * inverse, 0.0, 0.0
 
 
-@compiled(reassociate=True, borrows=True)
+@compiled(borrows=True)
 def _all_sums(m: FlatMap, x: float, y: float) -> tuple[Sums, int]:
     """Sums over the whole boundary at a point of the square; and the vertex that it counts as, or -1."""
     leaf, vertex, rounding = leaf_at(m, x, y), -1, m[2]
@@ -502,7 +502,7 @@ def _all_sums(m: FlatMap, x: float, y: float) -> tuple[Sums, int]:
     return total, vertex
 
 
-@compiled(reassociate=True, borrows=True)
+@compiled(borrows=True)
 def evaluate_one(m: FlatMap, x: float, y: float) -> tuple[float, float, float, float, float, float]:
     """u, v, u_x, u_y, v_x, v_y at a point relative to the map's centre [-, 1/m].
 
@@ -524,7 +524,7 @@ def evaluate_one(m: FlatMap, x: float, y: float) -> tuple[float, float, float, f
     return c * tu, c * tv, c * xu, c * yu, c * xv, c * yv
 
 
-@compiled(reassociate=True)
+@compiled
 def evaluate_many(m: FlatMap, points: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Images (n, 2) [-] and Jacobians (n, 2, 2) [1/m] of points (n, 2) relative to the map's centre [m]."""
     images, jacobians = np.empty((len(points), 2)), np.empty((len(points), 2, 2))

@@ -101,7 +101,7 @@ class VelocityField:
         return self._map, self._field
 
 
-@compiled(reassociate=True, borrows=True)
+@compiled(borrows=True)
 def velocity_in_field(flat: FlatMap, field: FloatArray, x: float, y: float) -> tuple[float, float]:
     """Velocity at a point of W [m], eq. (13) [m/s].
 
@@ -128,7 +128,7 @@ def velocity_in_field(flat: FlatMap, field: FloatArray, x: float, y: float) -> t
     return speed * dx / norm, speed * dy / norm
 
 
-@compiled(reassociate=True)
+@compiled
 def _velocities_in_field(flat: FlatMap, field: FloatArray, points: FloatArray) -> FloatArray:
     """Velocities at many points of W, shape (n, 2) [m] -> (n, 2) [m/s]."""
     velocities = np.empty((len(points), 2))

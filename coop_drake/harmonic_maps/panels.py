@@ -88,13 +88,13 @@ def lay_panels(outline: Outline, closeness: float) -> Panels:
     return Panels(legs, pieces[:, 0].astype(np.int64), pieces[:, 1], pieces[:, 2], pieces[:, 3])
 
 
-@compiled(reassociate=True)
+@compiled
 def point_distance(px: float, py: float, ax: float, ay: float, bx: float, by: float) -> float:
     """Distance of a point from a segment from a to b [m]."""
     return float(np.sqrt(squared_distance(px, py, ax, ay, bx, by)))
 
 
-@compiled(reassociate=True, borrows=True)
+@compiled(borrows=True)
 def segment_distance(p: FloatArray, q: FloatArray) -> float:
     """Distance of two segments (x0, y0, x1, y1) that do not cross [m]."""
     return min(
@@ -109,7 +109,7 @@ def segment_distance(p: FloatArray, q: FloatArray) -> float:
     )
 
 
-@compiled(reassociate=True)
+@compiled
 def _corner_legs(
     edges: FloatArray, preceding: np.ndarray, longest: FloatArray, closeness: float
 ) -> FloatArray:
@@ -156,7 +156,7 @@ def _close_slivers(lengths: FloatArray, following: np.ndarray, legs: FloatArray)
                 legs[after] *= 0.8
 
 
-@compiled(reassociate=True)
+@compiled
 def _edge_panels(
     edges: FloatArray, following: np.ndarray, legs: FloatArray, longest: FloatArray, closeness: float,
     rows: FloatArray,

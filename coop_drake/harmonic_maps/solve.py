@@ -174,7 +174,7 @@ def _double_layer(grid: Nodes, segments: ComplexArray, panel_edge: IntArray, nod
     )
 
 
-@compiled(reassociate=True)
+@compiled
 def _block(k: _DoubleLayer, rows: IntArray, columns: IntArray, row_of: IntArray) -> FloatArray:
     """Entries of 2 K at ``rows``, the targets, x ``columns``, the sources, stored column by column.
 
@@ -227,7 +227,7 @@ def _mark_near(
     return sources, targets
 
 
-@compiled(reassociate=True, borrows=True)
+@compiled(borrows=True)
 def _find_near(
     target: ComplexArray, target_edge: IntArray, segments: ComplexArray, edge: IntArray,
     start: IntArray, found: IntArray,
@@ -252,7 +252,7 @@ def _find_near(
     return end
 
 
-@compiled(reassociate=True)
+@compiled
 def _near_weights(
     target: ComplexArray, segments: ComplexArray, start: IntArray, found: IntArray, transform: FloatArray
 ) -> FloatArray:
@@ -268,7 +268,7 @@ def _near_weights(
     return weights
 
 
-@compiled(reassociate=True, borrows=True)
+@compiled(borrows=True)
 def legendre_moments(zeta: complex, out: FloatArray) -> None:
     """1/pi times the imaginary part of the integral of P_k(x) / (x - zeta) over [-1, 1], k from 0."""
     turn = np.arctan2(zeta.imag, zeta.real + 1.0) - np.arctan2(zeta.imag, zeta.real - 1.0)

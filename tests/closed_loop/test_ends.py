@@ -108,7 +108,7 @@ def test_a_transport_ends_off_a_goal_in_collision_and_within_its_tolerance(tmp_p
     """The object, half a metre wide, has its middle 0.24 m from the wall; the tolerance is 0.03 m."""
     goal = {"object": {"x": 3.2, "y": 0.24, "theta": 0.0}, "tolerances": {"position": 0.03}}
     scenario, out = write_scenario(tmp_path / "room.scenario.yaml", goal=goal), tmp_path / "out"
-    run = invoke("run", scenario, "--out", out, "--json")
+    run = invoke("run", scenario, "--out", out, "--no-figures", "--json")
     assert run.exit_code == 0, run.stderr
     assert json.loads(run.stdout)["final_position_error_m"] < 0.03
     last = json.loads((out / "plan.json").read_text())["transitions"][-1]
