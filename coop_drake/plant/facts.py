@@ -189,6 +189,8 @@ def _properties(body: BodyMass, share: float) -> tuple[float, ...]:
 
 def team_masses(team: TeamPlant, tree: ComponentTree) -> list[BodyMass]:
     """Return masses of every robot's and the object's bodies in every component of the team's tree."""
+    from coop_drake.verification.runs.rows import BodyMass
+
     plant, (groups, origins) = team.plant, component_bodies(team, tree)
     context = plant.CreateDefaultContext()
     plant.SetPositionsAndVelocities(context, np.zeros(plant.num_multibody_states()))
