@@ -9,16 +9,7 @@ from math import inf, nan, sqrt
 
 import numpy as np
 
-from coop_drake.compiled_loop import watching
-from coop_drake.compiled_loop.arrays import (
-    LoopDepartures,
-    LoopMemory,
-    LoopNominal,
-    LoopTeam,
-    plant_room,
-    robot_room,
-    watch_room,
-)
+from coop_drake.compiled_loop import arrays, watching
 from coop_drake.compiled_loop.loop import run_loop
 from coop_drake.compiled_loop.preparing import CompiledTransport
 from coop_drake.diagram.deployment import (
@@ -74,7 +65,7 @@ def check_deployment(transport: CompiledTransport, deployment: Deployment) -> fl
     return deployment.period
 
 
-def departures_of(transport: CompiledTransport, deployment: Deployment) -> LoopDepartures:
+def departures_of(transport: CompiledTransport, deployment: Deployment) -> arrays.LoopDepartures:
     """Return what departs in a run.
 
     Raises:
@@ -91,7 +82,7 @@ def departures_of(transport: CompiledTransport, deployment: Deployment) -> LoopD
     ]
     hearing = [[own.clock_error for own in robots]]
     hearing.append([whole_periods(own.switch_delay, period) for own in robots])
-    return LoopDepartures(
+    return arrays.LoopDepartures(
         times=np.array([period, transport.scenario.simulator.max_time, deployment.actuators.lag]),
         periods=np.array([
             whole_periods(m.delay, period),
@@ -122,7 +113,7 @@ def _silences(deployment: Deployment, names: tuple[str, ...]) -> FloatArray:
     return np.array(rows).T.copy()
 
 
-def believed(team: LoopTeam, mass_error: float) -> LoopTeam:
+def believed(team: arrays.LoopTeam, mass_error: float) -> arrays.LoopTeam:
     """Return the robots' models as they believe them to be: all masses and inertias wrong by a factor."""
     factor, chains, loads = 1.0 + mass_error, team.chains.copy(), team.loads.copy()
     chains[:, [MASS, INERTIA]] *= factor
@@ -130,7 +121,7 @@ def believed(team: LoopTeam, mass_error: float) -> LoopTeam:
     return team._replace(chains=chains, loads=loads)
 
 
-def nominal_of(transport: CompiledTransport, period: float) -> LoopNominal:
+def nominal_of(transport: CompiledTransport, period: float) -> arrays.LoopNominal:
     """Return the nominal motions for a control period [s]."""
     budget, gains = transport.plan.budget, transport.plan.transitions[0].gains
     nominal = transport.nominal
@@ -148,7 +139,7 @@ def _flow(stiffness: float, damping: float, period: float) -> FloatArray:
     return nominal_flow(stiffness, damping, period)
 
 
-def memory_of(transport: CompiledTransport, departures: LoopDepartures) -> LoopMemory:
+def memory_of(transport: CompiledTransport, departures: arrays.LoopDepartures) -> arrays.LoopMemory:
     """Return the state of a run at its start: at rest, with nothing measured and nothing heard."""
     robots, M = len(transport.robot_names), len(transport.first_axes)
     states, efforts = 2 * (2 * robots + M), 2 * robots + M
@@ -156,7 +147,7 @@ def memory_of(transport: CompiledTransport, departures: LoopDepartures) -> LoopM
     start, widest = transport.plan.start, int(2 * (3 + np.diff(transport.team.first[2]).max()))
     channels = channel_rows(int(departures.periods[2]))
     nothing = np.zeros(M)
-    return LoopMemory(
+    return arrays.LoopMemory(
         state=transport.start.copy(),
         current=np.zeros((int(departures.hearing[1].max()) + ring, 2)),
         poses=np.zeros((ring, robots, 3)),
@@ -264,9 +255,9 @@ def run(
         nominal_of(transport, period),
         departures,
         memory,
-        robot_room(team, memory),
-        plant_room(team, plant),
-        watch_room(plant),
+        arrays.robot_room(team, memory),
+        arrays.plant_room(team, plant),
+        arrays.watch_room(plant),
         figures,
     )
     return _outcome(transport, figures, period)

@@ -25,6 +25,7 @@ from pydrake.multibody.tree import (
 )
 from pydrake.systems.framework import Context, DiagramBuilder
 
+from coop_drake.plant import parsing
 from coop_drake.plant.chain import (
     check_masses,
     check_planar,
@@ -33,15 +34,6 @@ from coop_drake.plant.chain import (
     object_frame,
     planar_pose,
     scoped,
-)
-from coop_drake.plant.parsing import (
-    add_copy,
-    add_models,
-    bodies_of,
-    finalize,
-    joints_of,
-    read_once,
-    set_actuators,
 )
 from coop_drake.scenario import Assembly, Deployment, RobotAssembly, Scenario, assemble
 from coop_drake.tree.pose import FloatArray, PlanarPose
@@ -101,7 +93,7 @@ def _weld(plant: MultibodyPlant, robot: RobotAssembly) -> tuple[int, WeldJoint]:
     }
     return next(
         (place, joint)
-        for place, joint in enumerate(joints_of(plant))
+        for place, joint in enumerate(parsing.joints_of(plant))
         if joint.type_name() == "weld"
         and {int(joint.parent_body().index()), int(joint.child_body().index())} == ends
     )
@@ -242,7 +234,7 @@ def build_team_plant(scenario: Scenario, builder: DiagramBuilder) -> TeamPlant:
         ScenarioError: The models do not make a team of holonomic planar manipulators that hold one object.
     """
     assembly, read, geometry, of_frame, of_joint = _read_team(scenario)
-    plant, scene_graph = add_copy(builder, read, geometry)
+    plant, scene_graph = parsing.add_copy(builder, read, geometry)
     frame, context = plant.get_frame(of_frame), plant.CreateDefaultContext()
     robots: list[RobotModel] = []
     for robot in assembly.robots:
@@ -268,7 +260,9 @@ def build_team_plant(scenario: Scenario, builder: DiagramBuilder) -> TeamPlant:
         object_body=frame.body(),
         object_frame=frame,
         object_joint=plant.get_joint(of_joint),
-        object_inertia=_object_inertia(plant, context, bodies_of(plant, [assembly.object_model]), frame),
+        object_inertia=_object_inertia(
+            plant, context, parsing.bodies_of(plant, [assembly.object_model]), frame
+        ),
         robots=tuple(robots),
         grasps=WeldedGrasps(plant, assembly.robots),
         assembly=assembly,
@@ -276,7 +270,7 @@ def build_team_plant(scenario: Scenario, builder: DiagramBuilder) -> TeamPlant:
     )
 
 
-@read_once
+@parsing.read_once
 def _read_team(
     scenario: Scenario,
 ) -> tuple[Assembly, MultibodyPlant, SceneGraph, FrameIndex, JointIndex]:
@@ -285,13 +279,13 @@ def _read_team(
     plant, scene_graph = MultibodyPlant(0.0), SceneGraph()
     plant.set_name("plant")
     plant.RegisterAsSourceForSceneGraph(scene_graph)
-    add_models(scenario, assembly, range(len(assembly.directives)), plant, scene_graph)
+    parsing.add_models(scenario, assembly, range(len(assembly.directives)), plant, scene_graph)
     fix_joints(scenario, assembly, plant)
     frame = object_frame(scenario, assembly, plant)
     object_joint = plant.AddJoint(PlanarJoint("pose", plant.world_frame(), frame))
     chains = [find_base(scenario, robot, plant) for robot in assembly.robots]
-    set_actuators(plant, [joint for _, joints in chains for joint in joints])
-    finalize(scenario, plant)
+    parsing.set_actuators(plant, [joint for _, joints in chains for joint in joints])
+    parsing.finalize(scenario, plant)
     context = plant.CreateDefaultContext()
     check_planar(scenario, assembly, plant, context, chains)
     check_masses(scenario, assembly, plant, context)
@@ -374,7 +368,7 @@ class RobotPlant:
 
     def scale_masses(self, factor: float) -> None:
         """Multiply mass and inertia of every body by a factor, to model a robot that errs about them."""
-        for body in bodies_of(self.plant, self._models):
+        for body in parsing.bodies_of(self.plant, self._models):
             inertia = body.CalcSpatialInertiaInBodyFrame(self.context)
             scaled = SpatialInertia(
                 factor * inertia.get_mass(), inertia.get_com(), inertia.get_unit_inertia()
@@ -418,17 +412,17 @@ def build_robot_plant(scenario: Scenario, k: int) -> RobotPlant:
     return replace(robot, context=robot.plant.CreateDefaultContext())
 
 
-@read_once
+@parsing.read_once
 def _read_robot(scenario: Scenario, k: int) -> RobotPlant:
     assembly = assemble(scenario)
     robot = assembly.robots[k]
     plant = MultibodyPlant(0.0)
-    add_models(scenario, assembly, assembly.of_robot(k), plant, None)
+    parsing.add_models(scenario, assembly, assembly.of_robot(k), plant, None)
     fix_joints(scenario, assembly, plant)
     base, joints = find_base(scenario, robot, plant)
     base_joint = plant.AddJoint(PlanarJoint("base_pose", plant.world_frame(), base.body_frame()))
-    set_actuators(plant, joints)
-    finalize(scenario, plant)
+    parsing.set_actuators(plant, joints)
+    parsing.finalize(scenario, plant)
     positions = [base_joint.position_start() + i for i in range(3)] + [j.position_start() for j in joints]
     velocities = [base_joint.velocity_start() + i for i in range(3)] + [j.velocity_start() for j in joints]
     return RobotPlant(

@@ -15,17 +15,8 @@ from coop_drake.harmonic_maps import VelocityField
 from coop_drake.laws.gains import TransitionGains
 from coop_drake.laws.nominal import nominal_flow
 from coop_drake.laws.ppc import governed_gains
+from coop_drake.systems import kernels
 from coop_drake.systems.block import CLOCK_SIZE, CURRENT_CELL_SIZE, Block, clock_of, index_of
-from coop_drake.systems.kernels import (
-    NOMINAL_SIZE,
-    STATE_SIZE,
-    accelerate_along,
-    cell_margin,
-    govern,
-    nominal_margin,
-    show_nominal,
-    step_nominal,
-)
 from coop_drake.tree.pose import FloatArray
 
 
@@ -85,9 +76,9 @@ class ReferenceGovernor(Block):
         super().__init__()
         if not cells:
             raise ValueError("ReferenceGovernor needs at least one cell")
-        self._govern = [partial(govern, *cell.known) for cell in cells]
+        self._govern = [partial(kernels.govern, *cell.known) for cell in cells]
         self._gains = [partial(governed_gains, cell.row) for cell in cells]
-        self._margin = [partial(cell_margin, cell.clearance.edges) for cell in cells]
+        self._margin = [partial(kernels.cell_margin, cell.clearance.edges) for cell in cells]
         self._object = self.DeclareVectorInputPort("object_state", 6)
         self._governor = self.DeclareVectorInputPort("governor_position", 2)
         self._current = self.DeclareVectorInputPort("current_cell", CURRENT_CELL_SIZE)
@@ -179,13 +170,13 @@ class NominalGovernor(Block):
         flow = nominal_flow(gains.stiffness, gains.damping, motion.period)
         self._motion = motion
         flowing = flow, motion.period, motion.tube.speed
-        self._steps = [partial(step_nominal, *cell.known, *flowing) for cell in cells]
+        self._steps = [partial(kernels.step_nominal, *cell.known, *flowing) for cell in cells]
         tracking = motion.tracking_row(cells[0])
-        self._accelerate = partial(accelerate_along, tracking)
+        self._accelerate = partial(kernels.accelerate_along, tracking)
         regions = [(cell.clearance.edges, gains.stiffness) for cell in cells]
-        self._margins = [partial(nominal_margin, *region) for region in regions]
+        self._margins = [partial(kernels.nominal_margin, *region) for region in regions]
         self._shows = [
-            partial(show_nominal, *region, target, *_reports_of(motion))
+            partial(kernels.show_nominal, *region, target, *_reports_of(motion))
             for region, target in zip(regions, motion.targets, strict=True)
         ]
         self._object = self.DeclareVectorInputPort("object_state", 6)
@@ -195,7 +186,7 @@ class NominalGovernor(Block):
         self.DeclareVectorOutputPort("governor_command", 4, self._write_command)
         self.declare_kept("governor_position", 2, first=4)
         self.DeclareVectorOutputPort("energy_margin", 1, self._write_margin)
-        self.DeclareVectorOutputPort("nominal", NOMINAL_SIZE, self._write_nominal)
+        self.DeclareVectorOutputPort("nominal", kernels.NOMINAL_SIZE, self._write_nominal)
         self.declare_update(self._step, motion.period, motion.offset)
 
     def state_at_rest(self, position: FloatArray) -> FloatArray:
@@ -213,18 +204,18 @@ class NominalGovernor(Block):
 
     def _write_margin(self, context: Context, output: BasicVector) -> None:
         index = index_of(self._current.Eval(context), len(self._margins))
-        output[0] = self._margins[index](self.kept(context)[:STATE_SIZE])
+        output[0] = self._margins[index](self.kept(context)[: kernels.STATE_SIZE])
 
     def _write_nominal(self, context: Context, output: BasicVector) -> None:
         index = index_of(self._current.Eval(context), len(self._shows))
-        self._shows[index](self.kept(context)[:STATE_SIZE], output.get_mutable_value())
+        self._shows[index](self.kept(context)[: kernels.STATE_SIZE], output.get_mutable_value())
 
     def _step(self, context: Context, discrete_state: DiscreteValues) -> EventStatus:
         motion, state = self._motion, self.kept(context)
         index = index_of(self._current.Eval(context), len(self._steps))
         following = discrete_state.get_mutable_vector().get_mutable_value()
         pace = float(clock_of(self._clock, context)[1])
-        self._steps[index](pace, state[:STATE_SIZE], following[:STATE_SIZE])
+        self._steps[index](pace, state[: kernels.STATE_SIZE], following[: kernels.STATE_SIZE])
         following[6:8] = state[4:6]
         if motion.measurement_periods:
             following[8:12], following[12:] = state[:4], state[8:-4]

@@ -9,15 +9,7 @@ from functools import partial
 import numpy as np
 from pydrake.systems.framework import BasicVector, Context, DiscreteValues, EventStatus
 
-from coop_drake.laws.readiness import (
-    FAR,
-    ArrivalGoal,
-    alarm_at,
-    arrival_margin,
-    axis_level,
-    largest_departure,
-    mean_samples,
-)
+from coop_drake.laws import readiness
 from coop_drake.laws.robot_dynamics import estimate_object, motion_room
 from coop_drake.systems.block import ALARM_SIZE, CURRENT_CELL_SIZE, Block, index_of
 from coop_drake.systems.kernels import NOMINAL_SIZE
@@ -87,7 +79,7 @@ class DepartureMonitor(Block):
         motion = motion_room(robot.chain)
         self._estimate = partial(estimate_object, robot.chain, robot.p_LE, motion)
         known = robot.chain, robot.p_LE, robot.mounting, motion
-        self._largest = partial(largest_departure, *known)
+        self._largest = partial(readiness.largest_departure, *known)
         self._state = self.DeclareVectorInputPort("robot_state", size)
         self._pose = self.DeclareVectorInputPort("object_pose", 3)
         self._led = self.DeclareVectorInputPort("nominal", NOMINAL_SIZE)
@@ -123,7 +115,7 @@ class DepartureMonitor(Block):
         lower, upper = self._funnels.Eval(context).reshape(2, -1)
         levels = alarms[index_of(self._cell.Eval(context), len(alarms))].copy()
         for i, reserve in enumerate(self._robot.axis_reserve):
-            levels[0, i] = axis_level(levels[0, i], reserve, axes[i], lower[i], upper[i])
+            levels[0, i] = readiness.axis_level(levels[0, i], reserve, axes[i], lower[i], upper[i])
         return np.concatenate([led, axes, levels.ravel()])
 
     def _write_alarm(self, context: Context, output: BasicVector) -> None:
@@ -134,7 +126,9 @@ class DepartureMonitor(Block):
         axes, levels = then[4:].reshape(2, 2, -1) if self._axes else np.empty((2, 2, 0))
         known = self._robot.levels, levels, self._robot.unseen
         share, which = self._largest(measured, seen, then[:4].copy(), axes, *known)
-        output.SetFromVector([alarm_at(share, context.get_time(), float(past[0])), share, float(which)])
+        output.SetFromVector(
+            [readiness.alarm_at(share, context.get_time(), float(past[0])), share, float(which)]
+        )
 
     def _remember(self, context: Context, discrete_state: DiscreteValues) -> EventStatus:
         past = self.kept(context)
@@ -167,10 +161,10 @@ class ArrivalMonitor(Block):
         offset: Time of the first sample [s].
     """
 
-    def __init__(self, goal: ArrivalGoal, cells: int, period: float, offset: float = 0.0) -> None:
+    def __init__(self, goal: readiness.ArrivalGoal, cells: int, period: float, offset: float = 0.0) -> None:
         super().__init__()
-        self._shape, self._cells = (2 * mean_samples(period), goal.place.size), cells
-        self._margin = partial(arrival_margin, *goal)
+        self._shape, self._cells = (2 * readiness.mean_samples(period), goal.place.size), cells
+        self._margin = partial(readiness.arrival_margin, *goal)
         self._state = self.DeclareVectorInputPort("robot_state", 2 * goal.place.size)
         self._pose = self.DeclareVectorInputPort("object_pose", 3)
         self._cell = self.DeclareVectorInputPort("current_cell", CURRENT_CELL_SIZE)
@@ -194,7 +188,7 @@ class ArrivalMonitor(Block):
 
     def _write_arrival(self, context: Context, output: BasicVector) -> None:
         if not self._is_last(context):
-            output.SetFromVector([FAR])
+            output.SetFromVector([readiness.FAR])
             return
         recent = self.kept(context).reshape(self._shape)
         output.SetFromVector([self._margin(recent, self._shape[0] - 1)])

@@ -8,15 +8,9 @@ from functools import partial
 from pydrake.systems.framework import BasicVector, Context, DiscreteValues, EventStatus
 
 from coop_drake.laws.readiness import quiet_margin
+from coop_drake.systems import kernels
 from coop_drake.systems.block import ALARM_SIZE, CURRENT_CELL_SIZE, READY_SIZE, Block, index_of
 from coop_drake.systems.governor import GovernedCell
-from coop_drake.systems.kernels import (
-    NOMINAL_SIZE,
-    NOTHING,
-    ready_conditions,
-    robot_arrived,
-    robot_ready,
-)
 from coop_drake.systems.ppc import AxisLaw
 from coop_drake.tree.pose import FloatArray
 
@@ -74,7 +68,7 @@ class ReadyMonitor(Block):
             )
         if not position_tolerance > 0.0:
             raise ValueError(f"ReadyMonitor's position tolerance must be positive, not {position_tolerance}")
-        conditions = ready_conditions(
+        conditions = kernels.ready_conditions(
             [law.table for law in laws],
             [cell.clearance.edges for cell in cells],
             [cell.row for cell in cells],
@@ -82,18 +76,18 @@ class ReadyMonitor(Block):
             goal_position,
             position_tolerance,
         )
-        self._ready = [partial(robot_ready, *known) for known in conditions]
+        self._ready = [partial(kernels.robot_ready, *known) for known in conditions]
         n = laws[0].axes - 1
         self._object = self.DeclareVectorInputPort("object_state", 6)
         self._state = self.DeclareVectorInputPort("robot_state", 2 * (3 + n))
         self._governor = self.DeclareVectorInputPort("governor_position", 2)
         self._current = self.DeclareVectorInputPort("current_cell", CURRENT_CELL_SIZE)
-        self._nominal = self.DeclareVectorInputPort("nominal", NOMINAL_SIZE) if nominal else None
+        self._nominal = self.DeclareVectorInputPort("nominal", kernels.NOMINAL_SIZE) if nominal else None
         self._alarm = self.DeclareVectorInputPort("alarm", ALARM_SIZE) if nominal else None
         self._arrival = self.DeclareVectorInputPort("arrival", 1) if measured else None
         last = conditions[-1]
         known = last.table, last.goal, last.tolerance, axes_led
-        self._arrived: Callable[..., float] = partial(robot_arrived, *known)
+        self._arrived: Callable[..., float] = partial(kernels.robot_arrived, *known)
         self.DeclareVectorOutputPort("ready", READY_SIZE, self._write_ready)
 
     def _write_ready(self, context: Context, output: BasicVector) -> None:
@@ -101,7 +95,7 @@ class ReadyMonitor(Block):
         index = index_of(current, len(self._ready))
         report[0] = index
         seen, robot = self._object.Eval(context), self._state.Eval(context)
-        led = NOTHING if self._nominal is None else self._nominal.Eval(context)
+        led = kernels.NOTHING if self._nominal is None else self._nominal.Eval(context)
         if self._arrival is not None and index + 1 == len(self._ready):
             report[1] = self._arrived(seen, robot, led, float(self._arrival.Eval(context)[0]))
         else:

@@ -19,17 +19,8 @@ from coop_drake.answers.log import SimulationLog
 from coop_drake.answers.plan import Plan
 from coop_drake.scenario import Scenario
 from coop_drake.simulation import Sample
+from coop_drake.viz import scene
 from coop_drake.viz.recording import scene_content, verdict_of, with_overlay
-from coop_drake.viz.scene import (
-    ABOVE,
-    FIELD_OF_VIEW,
-    STEP,
-    TransportScene,
-    arrow_path,
-    arrow_sizes,
-    cell_paths,
-    set_trail,
-)
 
 # The live view: shows a run in a browser while it is simulated, no faster than in reality.
 
@@ -51,7 +42,7 @@ class LiveView:
     """
 
     def __init__(self, scenario: Scenario, plan: Plan, meshcat: Meshcat, *, rate: float = 1.0) -> None:
-        self.scene = TransportScene(scenario, plan, meshcat)
+        self.scene = scene.TransportScene(scenario, plan, meshcat)
         self.scene.place_camera()
         self._rate = rate
         self._began: float | None = None
@@ -88,25 +79,25 @@ class LiveView:
         if cell == self._cell:  # Hiding and showing it again would make it flicker.
             return
         for index, visible in ((self._cell, False), (cell, True)):
-            for path in cell_paths(index):
+            for path in scene.cell_paths(index):
                 self.scene.meshcat.SetProperty(path, "visible", visible)
         self._cell = cell
 
     def _show_forces(self, sample: Sample) -> None:
         meshcat, grasps = self.scene.meshcat, self.scene.team.grasp_points(sample.z)
         for index, wrench in enumerate(sample.measured_wrenches):
-            path = arrow_path(index)
-            sizes = arrow_sizes(wrench[None, :2], self.scene.of_a_metre)
+            path = scene.arrow_path(index)
+            sizes = scene.arrow_sizes(wrench[None, :2], self.scene.of_a_metre)
             direction, scales = (value[0] for value in sizes)
             R_WA = RotationMatrix.MakeZRotation(direction)
-            meshcat.SetTransform(path, RigidTransform(R_WA, grasps[index] + ABOVE))
+            meshcat.SetTransform(path, RigidTransform(R_WA, grasps[index] + scene.ABOVE))
             meshcat.SetProperty(path, "scale", scales.tolist())
 
     def _show_trail(self, position: np.ndarray) -> None:
-        if np.linalg.norm(position - self._trail[-1]) < STEP:
+        if np.linalg.norm(position - self._trail[-1]) < scene.STEP:
             return
         self._trail.append(position.copy())
-        set_trail(self.scene.meshcat, f"/motion/trail/{self._pieces:05d}", np.array(self._trail[-2:]))
+        scene.set_trail(self.scene.meshcat, f"/motion/trail/{self._pieces:05d}", np.array(self._trail[-2:]))
         self._pieces += 1
 
 
@@ -147,7 +138,7 @@ class LivePage:
         robots = dict(zip((robot.name for robot in team.team.robots), team.colours, strict=True))
         content = scene_content(scenario, robots, of_a_metre) | {
             "port": meshcat.port(),
-            "field_of_view": FIELD_OF_VIEW,
+            "field_of_view": scene.FIELD_OF_VIEW,
         }
         self._page = with_overlay(empty, content, "live.html").encode()
         self._news: dict[str, Any] = {"details": "the run has not begun", "verdict": "", "recording": False}

@@ -8,17 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
-from coop_drake.laws import (
-    FixedGains,
-    Funnel,
-    ScheduledGains,
-    energy_margin,
-    governed_acceleration,
-    governor_velocity,
-    slowdown_radius,
-    tracking_energy,
-    transition_gains,
-)
+from coop_drake import laws
 from coop_drake.laws.axis_table import (
     GOAL_LOWER,
     GOAL_UPPER,
@@ -41,20 +31,20 @@ K, K_G = 50.0, 5.0
 
 
 def test_the_field_leads_while_the_margin_is_large():
-    velocity = governor_velocity(0.3, -0.4, 100.0, K, K_G, 0.0)
+    velocity = laws.governor_velocity(0.3, -0.4, 100.0, K, K_G, 0.0)
     assert velocity == pytest.approx([1.5, -2.0])
 
 
 @pytest.mark.parametrize("smoothing", [0.0, 0.001, 0.1])
 def test_the_root_leads_while_the_margin_is_small(smoothing):
-    velocity = governor_velocity(0.6, -0.8, 0.02, K, K_G, smoothing)
+    velocity = laws.governor_velocity(0.6, -0.8, 0.02, K, K_G, smoothing)
     root = np.sqrt(0.02 / 50.0 + smoothing**2) - smoothing
     assert velocity == pytest.approx(5.0 * root * np.array([0.6, -0.8]))
 
 
 def test_the_smoothed_root_is_lipschitz_and_the_printed_one_is_not():
     def slope(smoothing, margin):
-        return governor_velocity(1.0, 0.0, margin, K, K_G, smoothing)[0] / margin
+        return laws.governor_velocity(1.0, 0.0, margin, K, K_G, smoothing)[0] / margin
 
     assert slope(0.0, 1e-12) > 1e3 * slope(0.0, 1e-4)
     assert slope(0.001, 1e-12) <= 5.0 / (2.0 * 0.001 * 50.0)
@@ -63,9 +53,9 @@ def test_the_smoothed_root_is_lipschitz_and_the_printed_one_is_not():
 def test_a_target_is_approached_no_faster_than_the_integrator_can_follow():
     """Copies of p_G that differ by rounding must not drift apart: the step stays in RK's stable region."""
     for governor_gain in (5.0, 16.0):
-        near = 0.01 * slowdown_radius(0.7, governor_gain)
-        field = 0.7 * near / slowdown_radius(0.7, governor_gain)
-        speed, _ = governor_velocity(field, 0.0, 1e6, 50.0, governor_gain, 0.0)
+        near = 0.01 * laws.slowdown_radius(0.7, governor_gain)
+        field = 0.7 * near / laws.slowdown_radius(0.7, governor_gain)
+        speed, _ = laws.governor_velocity(field, 0.0, 1e6, 50.0, governor_gain, 0.0)
         assert speed / near == pytest.approx(ATTRACTION_RATE)
     assert ATTRACTION_RATE * SimulatorSettings().max_step_size < 1.0
 
@@ -73,7 +63,7 @@ def test_a_target_is_approached_no_faster_than_the_integrator_can_follow():
 def test_the_loops_margin_is_the_law_with_velocities_in_steps():
     state, governor = np.array([1.0, 2.0, 0.3, 0.2, -0.1, 0.4]), np.array([1.1, 1.95])
     vx, vy = np.round(state[3:5] / VELOCITY_STEP) * VELOCITY_STEP
-    expected = energy_margin(tracking_energy(1.0 - 1.1, 2.0 - 1.95, vx, vy, K), 0.4, K)
+    expected = laws.energy_margin(laws.tracking_energy(1.0 - 1.1, 2.0 - 1.95, vx, vy, K), 0.4, K)
     assert object_energy_margin(state, governor, 0.4, K) == expected
     assert abs(state[3:5] - [vx, vy]).max() <= 0.5 * VELOCITY_STEP
     # Rounding of the measured velocity does not reach the margin.
@@ -84,19 +74,19 @@ def test_the_loops_margin_is_the_law_with_velocities_in_steps():
 
 
 def test_accelerations_and_energies_by_hand():
-    assert governed_acceleration(1.0, 0.5, 1.5, 50.0, 5.0) == 22.5
-    assert governed_acceleration(2.0, -1.0, 2.0, 50.0, 5.0) == 5.0
-    assert tracking_energy(0.0, -0.2, 3.0, 4.0, 50.0) == pytest.approx(0.5 * 25.0 + 0.5 * 50.0 * 0.04)
-    assert energy_margin(1.0, 0.4, 50.0) == pytest.approx(3.0)
-    assert energy_margin(0.0, 0.0, 50.0) == 0.0
-    assert energy_margin(0.0, -0.4, 50.0) == pytest.approx(-4.0)
+    assert laws.governed_acceleration(1.0, 0.5, 1.5, 50.0, 5.0) == 22.5
+    assert laws.governed_acceleration(2.0, -1.0, 2.0, 50.0, 5.0) == 5.0
+    assert laws.tracking_energy(0.0, -0.2, 3.0, 4.0, 50.0) == pytest.approx(0.5 * 25.0 + 0.5 * 50.0 * 0.04)
+    assert laws.energy_margin(1.0, 0.4, 50.0) == pytest.approx(3.0)
+    assert laws.energy_margin(0.0, 0.0, 50.0) == 0.0
+    assert laws.energy_margin(0.0, -0.4, 50.0) == pytest.approx(-4.0)
 
 
 @pytest.mark.parametrize("smoothing", [0.0, 0.001])
 @pytest.mark.parametrize("margin", [0.0, -1e-12, -3.0])
 def test_the_governor_waits_without_margin_and_rests_where_the_field_vanishes(margin, smoothing):
-    assert governor_velocity(0.6, -0.8, margin, K, K_G, smoothing) == (0.0, 0.0)
-    assert governor_velocity(0.0, 0.0, 1.0, K, K_G, smoothing) == (0.0, 0.0)
+    assert laws.governor_velocity(0.6, -0.8, margin, K, K_G, smoothing) == (0.0, 0.0)
+    assert laws.governor_velocity(0.0, 0.0, 1.0, K, K_G, smoothing) == (0.0, 0.0)
 
 
 ON_TIME = np.array([0.0, 1.0, 0.0])
@@ -111,13 +101,13 @@ AXES = {
 
 
 def gains_of(clearance, gain_set=None, resting=0.3):
-    return transition_gains(
-        gain_set or ScheduledGains(), clearance=clearance, resting=np.array([resting]), **AXES
+    return laws.transition_gains(
+        gain_set or laws.ScheduledGains(), clearance=clearance, resting=np.array([resting]), **AXES
     )
 
 
 def table_of(gains):
-    return axis_table(Funnel(**AXES, decay_rate=gains.decay_rate, shape=gains.funnel), gains)
+    return axis_table(laws.Funnel(**AXES, decay_rate=gains.decay_rate, shape=gains.funnel), gains)
 
 
 def test_fading_falls_from_one_to_zero_and_nowhere_faster_than_it_says():
@@ -138,14 +128,14 @@ def test_gains_of_the_governor_go_from_those_of_the_last_cell_to_their_own():
 
 
 def test_the_paper_s_gains_step():
-    paper = gains_of(0.1, FixedGains())
+    paper = gains_of(0.1, laws.FixedGains())
     assert paper.hand_over_time == 0.0
     assert governed_gains(paper.governor_row(gains_of(0.01)), 0.0) == (50.0, 5.0, 5.0)
 
 
 @pytest.mark.parametrize("age", [0.0125, 0.03, 0.1])
 def test_a_hand_over_takes_long_enough_for_the_largest_fall_of_k(age):
-    rule = schedule_of(ScheduledGains(command_age=age, hand_over_time=1e-3))
+    rule = schedule_of(laws.ScheduledGains(command_age=age, hand_over_time=1e-3))
     most, least = rule.max_stiffness, rule.min_stiffness
     damping = rule.damping_factor * np.sqrt(least)
     assert rule.hand_over_time == max(1e-3, shortest_hand_over(most, least, damping))
@@ -162,14 +152,14 @@ def worst_margin(duration, heading, share):
 
     def flow(t, z):
         stiffness, damping, _ = governed_gains(row, t)
-        return np.array([*z[2:], *governed_acceleration(z[:2], z[2:], np.zeros(2), stiffness, damping)])
+        return np.array([*z[2:], *laws.governed_acceleration(z[:2], z[2:], np.zeros(2), stiffness, damping)])
 
     times = np.linspace(0.0, duration, 200)
     run = solve_ivp(flow, (0.0, duration), [*position, *velocity], t_eval=times, rtol=1e-9, atol=1e-12)
     margins = []
     for t, z in zip(run.t, run.y.T, strict=True):
         stiffness = governed_gains(row, t)[0]
-        margin = energy_margin(tracking_energy(*z, stiffness), clearance, stiffness)
+        margin = laws.energy_margin(laws.tracking_energy(*z, stiffness), clearance, stiffness)
         margins.append(margin / (0.5 * stiffness * clearance**2))
     return min(margins)
 
@@ -219,7 +209,10 @@ def test_at_rest_the_next_law_begins_with_no_acceleration():
 
 
 def test_with_its_jump_the_next_law_begins_where_the_last_one_ends():
-    table, next_table = table_of(gains_of(0.1)), table_of(gains_of(0.1, ScheduledGains(command_age=0.03)))
+    table, next_table = (
+        table_of(gains_of(0.1)),
+        table_of(gains_of(0.1, laws.ScheduledGains(command_age=0.03))),
+    )
     state, jumps, before, after = np.array([0.0, 0.0, 0.8, 0.0, 0.0, 0.1]), *np.empty((3, 1))
     write_jumps(table, next_table, 0.4, ON_TIME, state, state, jumps)
     track_axes(table, 0.4, ON_TIME, np.zeros(1), state, state, before)

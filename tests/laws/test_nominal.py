@@ -9,17 +9,8 @@ from hypothesis import strategies as st
 from pydrake.systems.framework import DiagramBuilder
 from scipy.integrate import solve_ivp
 
+from coop_drake.laws import nominal
 from coop_drake.laws.governor import governed_acceleration
-from coop_drake.laws.nominal import (
-    carry_axes,
-    excursion,
-    limited_step,
-    nominal_flow,
-    place_on_axes,
-    pulled_axis,
-    reach_of,
-    tracked_acceleration,
-)
 from coop_drake.laws.robot_dynamics import motion_room, read_robot
 from coop_drake.plant import base_chain, build_team_plant
 from coop_drake.scenario import load_scenario
@@ -34,7 +25,7 @@ gains = st.sampled_from([(50.0, 9.9), (150.0, 17.1), (100.0, 20.0), (100.0, 45.0
 def test_the_flow_solves_the_equation_of_motion(damping):
     stiffness, period, steps = 100.0, 0.01, 4000
     state, h = np.array([0.3, -0.7]), period / steps
-    flow = nominal_flow(stiffness, damping, period) @ state
+    flow = nominal.nominal_flow(stiffness, damping, period) @ state
     for _ in range(steps):  # midpoint rule
         middle = state + 0.5 * h * np.array(
             [state[1], governed_acceleration(*state, 0.0, stiffness, damping)]
@@ -47,11 +38,11 @@ def test_the_flow_solves_the_equation_of_motion(damping):
 @given(gains, coordinates, coordinates, coordinates, coordinates)
 def test_the_excursion_never_grows_while_the_reference_rests(gains, x, y, vx, vy):
     stiffness, damping = gains
-    flow, before = nominal_flow(stiffness, damping, 0.005), excursion(x, y, vx, vy, stiffness)
+    flow, before = nominal.nominal_flow(stiffness, damping, 0.005), nominal.excursion(x, y, vx, vy, stiffness)
     first = before
     for _ in range(200):
         (x, vx), (y, vy) = flow @ (x, vx), flow @ (y, vy)
-        after = excursion(x, y, vx, vy, stiffness)
+        after = nominal.excursion(x, y, vx, vy, stiffness)
         assert after <= before * (1.0 + 1e-12) + 1e-15
         assert hypot(x, y) <= first * (1.0 + 1e-9) + 1e-15
         before = after
@@ -60,11 +51,11 @@ def test_the_excursion_never_grows_while_the_reference_rests(gains, x, y, vx, vy
 @settings(max_examples=60)
 @given(coordinates, coordinates, st.floats(-0.1, 0.5), st.floats(0.05, 2.0))
 def test_a_step_is_no_longer_than_allowed_and_keeps_its_direction(vx, vy, room, speed):
-    dx, dy = limited_step(vx, vy, 0.005, speed, room)
+    dx, dy = nominal.limited_step(vx, vy, 0.005, speed, room)
     assert hypot(dx, dy) <= min(0.005 * speed, 0.5 * max(room, 0.0)) * (1.0 + 1e-12)
     assert dx * vy == pytest.approx(dy * vx, abs=1e-12)
     assert dx * vx + dy * vy >= 0.0
-    free = limited_step(vx, vy, 0.005, 10.0, 10.0)
+    free = nominal.limited_step(vx, vy, 0.005, 10.0, 10.0)
     assert free == (0.005 * vx, 0.005 * vy)
 
 
@@ -75,21 +66,21 @@ def test_no_way_is_longer_than_the_reach():
         for periods in range(1, 9):
             step = min(0.005 * speed, 0.005 * 30.0 * off)
             way, off = way + step, off + step
-            assert way <= reach_of(distance, 0.005, float(periods), speed) * (1.0 + 1e-12)
+            assert way <= nominal.reach_of(distance, 0.005, float(periods), speed) * (1.0 + 1e-12)
 
 
 def test_on_the_nominal_motion_the_object_accelerates_as_it_does():
     own = governed_acceleration(0.1, 0.2, 0.15, 100.0, 14.0)
     same = (0.1, 0.2)
-    assert tracked_acceleration(0.1, 0.2, 0.15, same, same, (100.0, 14.0, 250.0, 30.0)) == own
-    off = tracked_acceleration(0.11, 0.2, 0.15, same, same, (100.0, 14.0, 250.0, 30.0))
+    assert nominal.tracked_acceleration(0.1, 0.2, 0.15, same, same, (100.0, 14.0, 250.0, 30.0)) == own
+    off = nominal.tracked_acceleration(0.11, 0.2, 0.15, same, same, (100.0, 14.0, 250.0, 30.0))
     assert off == pytest.approx(own - 2.5)
 
 
 @pytest.mark.parametrize("lag", [0.0, 0.003])
 def test_a_period_is_carried_as_the_differential_equation_says(lag):
     state, command, following = np.array([[0.2], [-0.7], [3.0]]), np.array([5.0]), np.empty((3, 1))
-    carry_axes(state, command, 0.01, lag, following)
+    nominal.carry_axes(state, command, 0.01, lag, following)
     if lag == 0.0:
         expected = [0.2 - 0.7 * 0.01 + 0.5 * 5.0 * 1e-4, -0.7 + 0.05, 5.0]
     else:
@@ -101,8 +92,8 @@ def test_a_period_is_carried_as_the_differential_equation_says(lag):
 
 
 def test_the_pull_is_that_of_a_spring_and_a_damper():
-    assert pulled_axis(1.5, 0.3, -0.2, (0.3, -0.2), (400.0, 30.0)) == 1.5
-    assert pulled_axis(1.5, 0.31, -0.1, (0.3, -0.2), (400.0, 30.0)) == pytest.approx(1.5 - 4.0 - 3.0)
+    assert nominal.pulled_axis(1.5, 0.3, -0.2, (0.3, -0.2), (400.0, 30.0)) == 1.5
+    assert nominal.pulled_axis(1.5, 0.31, -0.1, (0.3, -0.2), (400.0, 30.0)) == pytest.approx(1.5 - 4.0 - 3.0)
 
 
 def test_the_base_of_every_robot_turns_with_the_object_and_against_its_joints():
@@ -115,7 +106,7 @@ def test_the_base_of_every_robot_turns_with_the_object_and_against_its_joints():
         read_robot(base.chain, base.yaw, base.joints, motion_room(base.chain), state, expected)
         own = np.ascontiguousarray(axes[:, [0, *range(1 + robot.q_slice.start, 1 + robot.q_slice.stop)]])
         found[[0, 1]], found[[5, 6]] = away, away
-        place_on_axes(own, base.mounting, found)
+        nominal.place_on_axes(own, base.mounting, found)
         found[2] = np.angle(np.exp(1j * found[2]))
         np.testing.assert_allclose(found[[2, 3, 4, 7, 8, 9]], expected[[2, 3, 4, 7, 8, 9]], atol=1e-12)
         np.testing.assert_array_equal(found[[0, 1, 5, 6]], [*away, *away])

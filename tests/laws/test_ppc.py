@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
-from coop_drake.laws import Funnel, TransitionGains, funnel_bounds
+from coop_drake.laws import Funnel, TransitionGains, funnel_bounds, ppc
 from coop_drake.laws.axis_table import (
     ACCELERATION_LIMIT,
     LAW_COLUMNS,
@@ -19,20 +19,6 @@ from coop_drake.laws.axis_table import (
     track_row,
 )
 from coop_drake.laws.governor import AHEAD, driving_margin, energy_margin, steady_clearance
-from coop_drake.laws.ppc import (
-    FUNNEL_SHARE,
-    HOLD_RATE,
-    SETTLING_TIME,
-    axis_bounds,
-    damped,
-    decay_factor,
-    funnel_rate,
-    lagging_clock,
-    ramped_gain,
-    slowed_bounds,
-    slowed_decay_rate,
-    speed_damping,
-)
 from tests.support.prescribed import prescribed_acceleration, prescribed_energy
 
 FUNNEL = Funnel(
@@ -61,11 +47,11 @@ def literal_law(x, v, bounds, kappa, k1, k2, k1_rate=0.0):
 
 
 def test_a_gain_is_ramped_in_from_zero_with_its_rate():
-    assert ramped_gain(0.0, 3.0, 2.0) == (0.0, 0.0)
-    assert ramped_gain(50.0, 3.0, 2.0) == pytest.approx((3.0, 0.0), abs=1e-12)
-    assert ramped_gain(0.7, 3.0, 0.0) == (3.0, 0.0)
-    ahead, behind = (ramped_gain(0.7 + h, 3.0, 2.0)[0] for h in (1e-6, -1e-6))
-    assert ramped_gain(0.7, 3.0, 2.0)[1] == pytest.approx((ahead - behind) / 2e-6, rel=1e-6)
+    assert ppc.ramped_gain(0.0, 3.0, 2.0) == (0.0, 0.0)
+    assert ppc.ramped_gain(50.0, 3.0, 2.0) == pytest.approx((3.0, 0.0), abs=1e-12)
+    assert ppc.ramped_gain(0.7, 3.0, 0.0) == (3.0, 0.0)
+    ahead, behind = (ppc.ramped_gain(0.7 + h, 3.0, 2.0)[0] for h in (1e-6, -1e-6))
+    assert ppc.ramped_gain(0.7, 3.0, 2.0)[1] == pytest.approx((ahead - behind) / 2e-6, rel=1e-6)
 
 
 def test_rest_in_the_middle_of_still_walls_is_an_equilibrium():
@@ -114,7 +100,7 @@ def test_energy_is_the_log_term_plus_the_rate_error():
 def test_the_law_is_that_of_the_paper_in_its_own_letters(time, ramp):
     bounds = funnel_bounds(FUNNEL, time)
     x, v = 0.3 * bounds.lower + 0.7 * bounds.upper, np.array([0.4, -0.3, 1.0])
-    k1, k1_rate = ramped_gain(time, 3.0, ramp)
+    k1, k1_rate = ppc.ramped_gain(time, 3.0, ramp)
     ramped = {**GAINS, "position_gain": k1, "position_gain_rate": k1_rate}
     acceleration = prescribed_acceleration(x, v, bounds, **ramped)
     for i in range(3):
@@ -177,20 +163,20 @@ def test_differences_of_the_law_over_an_interval_keep_within_its_slopes(time, on
 def test_the_closed_form_solves_the_two_lags(held, start):
     def rates(_, state):
         a, b, _ = state
-        return [HOLD_RATE * (held - a), HOLD_RATE * (a - b), b]
+        return [ppc.HOLD_RATE * (held - a), ppc.HOLD_RATE * (a - b), b]
 
     solution = solve_ivp(rates, (0.0, 0.8), start, rtol=1e-11, atol=1e-12, t_eval=[0.05, 0.3, 0.8])
     for time, expected in zip(solution.t, solution.y.T, strict=True):
-        a, b, b_rate, lost = lagging_clock(time, held, np.array(start))
+        a, b, b_rate, lost = ppc.lagging_clock(time, held, np.array(start))
         np.testing.assert_allclose([a, b, lost], expected, atol=1e-8)
-        assert b_rate == pytest.approx(HOLD_RATE * (a - b))
+        assert b_rate == pytest.approx(ppc.HOLD_RATE * (a - b))
 
 
 def test_whatever_the_order_the_pace_stays_between_zero_and_one():
     generator, state = np.random.default_rng(3), np.zeros(3)
     for _ in range(200):
         held, time = float(generator.integers(2)), generator.exponential(0.1)
-        a, b, _, lost = lagging_clock(time, held, state)
+        a, b, _, lost = ppc.lagging_clock(time, held, state)
         assert 0.0 <= a <= 1.0
         assert 0.0 <= b <= 1.0
         assert 0.0 <= lost - state[2] <= time
@@ -198,8 +184,8 @@ def test_whatever_the_order_the_pace_stays_between_zero_and_one():
 
 
 def test_after_the_settling_time_the_clock_has_its_final_pace():
-    assert 1.0 - lagging_clock(SETTLING_TIME, 1.0, np.zeros(3))[1] < 1e-3
-    assert lagging_clock(SETTLING_TIME, 0.0, np.array([1.0, 1.0, 0.0]))[1] < 1e-3
+    assert 1.0 - ppc.lagging_clock(ppc.SETTLING_TIME, 1.0, np.zeros(3))[1] < 1e-3
+    assert ppc.lagging_clock(ppc.SETTLING_TIME, 0.0, np.array([1.0, 1.0, 0.0]))[1] < 1e-3
 
 
 @pytest.mark.parametrize("quintic", [True, False])
@@ -207,8 +193,8 @@ def test_rates_of_slowed_bounds_are_their_derivatives(quintic):
     funnel, start, h = (-1.0, 0.8, -0.2, 0.1, 3.0, quintic), np.array([0.6, 0.3, 0.05]), 1e-5
 
     def at(time):
-        _, b, b_rate, lost = lagging_clock(time, 1.0, start)
-        return slowed_bounds(axis_bounds(0.4 + time - lost, *funnel), 1.0 - b, -b_rate)
+        _, b, b_rate, lost = ppc.lagging_clock(time, 1.0, start)
+        return ppc.slowed_bounds(ppc.axis_bounds(0.4 + time - lost, *funnel), 1.0 - b, -b_rate)
 
     before, now, after = (np.array(at(0.1 + step)) for step in (-h, 0.0, h))
     np.testing.assert_allclose(now[2:4], (after[:2] - before[:2]) / (2.0 * h), atol=1e-7)
@@ -226,7 +212,7 @@ parts = st.floats(-30.0, 30.0)
 def test_damping_is_the_least_that_keeps_the_condition(acceleration, velocity, limit, gain):
     a, v = np.array(acceleration), np.array(velocity)
     room = 0.5 * gain * (limit**2 - v @ v)
-    damping = speed_damping(float(a @ v), float(v @ v), limit, gain)
+    damping = ppc.speed_damping(float(a @ v), float(v @ v), limit, gain)
     assert damping >= 0.0
     if v @ v > 1e-12:
         assert (a - damping * v) @ v <= room + 1e-9 * (1.0 + abs(room) + abs(a @ v))
@@ -237,10 +223,10 @@ def test_damping_is_the_least_that_keeps_the_condition(acceleration, velocity, l
 
 
 def test_without_a_limit_or_at_rest_nothing_is_damped():
-    assert speed_damping(1e6, 1e6, np.inf, 10.0) == 0.0
-    assert speed_damping(0.0, 0.0, 0.1, 10.0) == 0.0
-    assert damped(-7.0, 3.0, np.inf, 10.0) == -7.0
-    assert damped(5.0, -0.05, 0.1, 10.0) == 5.0  # braking is never limited
+    assert ppc.speed_damping(1e6, 1e6, np.inf, 10.0) == 0.0
+    assert ppc.speed_damping(0.0, 0.0, 0.1, 10.0) == 0.0
+    assert ppc.damped(-7.0, 3.0, np.inf, 10.0) == -7.0
+    assert ppc.damped(5.0, -0.05, 0.1, 10.0) == 5.0  # braking is never limited
 
 
 @settings(max_examples=200, deadline=None, derandomize=True)
@@ -262,7 +248,7 @@ def test_a_speed_that_begins_below_its_limit_stays_below_it(seed):
 
     def flow(t, v):
         a = waves @ np.sin(np.array([1.0, 3.0, 7.0]) * t + np.arange(3))
-        return a - speed_damping(float(a @ v), float(v @ v), limit, gain) * v
+        return a - ppc.speed_damping(float(a @ v), float(v @ v), limit, gain) * v
 
     run = solve_ivp(
         flow, (0.0, 2.0), [generator.uniform(0.0, limit), 0.0], method="LSODA", rtol=1e-7, atol=1e-9
@@ -274,13 +260,13 @@ def test_a_speed_that_begins_below_its_limit_stays_below_it(seed):
 @pytest.mark.parametrize("quintic", [True, False])
 def test_a_slowed_funnel_moves_at_a_share_of_the_limit(quintic):
     limit, shrink = 0.2, 0.6
-    rate = slowed_decay_rate(13.0, shrink, quintic, limit)
+    rate = ppc.slowed_decay_rate(13.0, shrink, quintic, limit)
     times = np.linspace(0.0, 10.0, 20001)
-    fastest = max(abs(decay_factor(float(t), rate, quintic)[1]) for t in times) * shrink
-    assert fastest == pytest.approx(FUNNEL_SHARE * limit, rel=1e-4)
-    assert funnel_rate(rate, shrink, quintic) == pytest.approx(fastest, rel=1e-4)
-    assert slowed_decay_rate(13.0, shrink, quintic, np.inf) == 13.0
-    assert slowed_decay_rate(1e-3, shrink, quintic, limit) == 1e-3
+    fastest = max(abs(ppc.decay_factor(float(t), rate, quintic)[1]) for t in times) * shrink
+    assert fastest == pytest.approx(ppc.FUNNEL_SHARE * limit, rel=1e-4)
+    assert ppc.funnel_rate(rate, shrink, quintic) == pytest.approx(fastest, rel=1e-4)
+    assert ppc.slowed_decay_rate(13.0, shrink, quintic, np.inf) == 13.0
+    assert ppc.slowed_decay_rate(1e-3, shrink, quintic, limit) == 1e-3
 
 
 def test_what_drives_the_governor_counts_no_more_clearance_than_the_limit_needs():

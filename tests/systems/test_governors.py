@@ -9,6 +9,7 @@ import pytest
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 
+from coop_drake import systems
 from coop_drake.answers.budget import AxisTracking
 from coop_drake.diagram.knowledge import robot_knowledge
 from coop_drake.laws import funnel_bounds, governed_acceleration, governor_velocity
@@ -17,14 +18,6 @@ from coop_drake.laws.nominal import carry_axes, nominal_flow, pulled_axis, track
 from coop_drake.laws.ppc import ramped_gain
 from coop_drake.plant import build_team_plant
 from coop_drake.simulation import build_maps
-from coop_drake.systems import (
-    AxisMotion,
-    AxisPpc,
-    NominalAxes,
-    NominalGovernor,
-    ReferenceGovernor,
-    axis_laws,
-)
 from coop_drake.systems.kernels import nominal_room
 from tests.support.prescribed import prescribed_acceleration
 from tests.support.small_loop import governed_cells
@@ -40,8 +33,8 @@ CELL = {
 
 
 def test_a_slower_clock_slows_the_governor_alone(cells):
-    command = evaluate(ReferenceGovernor(cells), CELL, "governor_command")
-    paced = ReferenceGovernor(cells, paced=True)
+    command = evaluate(systems.ReferenceGovernor(cells), CELL, "governor_command")
+    paced = systems.ReferenceGovernor(cells, paced=True)
     slowed = evaluate(paced, {**CELL, "clock": [0.1, 0.25, -0.5]}, "governor_command")
     np.testing.assert_array_equal(slowed, [*(0.25 * command[:2]), *command[2:]])
     assert np.linalg.norm(command[:2]) > 0.0
@@ -50,7 +43,7 @@ def test_a_slower_clock_slows_the_governor_alone(cells):
 @pytest.mark.parametrize("index", [-1, 3])
 def test_a_governor_refuses_a_cell_outside_the_plan(cells, index):
     with pytest.raises(IndexError, match=f"current_cell is {index}; the plan has cells 0 to 2"):
-        evaluate(ReferenceGovernor(cells), {**CELL, "current_cell": [index, 0.0]}, "energy_margin")
+        evaluate(systems.ReferenceGovernor(cells), {**CELL, "current_cell": [index, 0.0]}, "energy_margin")
 
 
 @pytest.fixture(scope="module")
@@ -62,7 +55,7 @@ def cells():
 def test_outputs_are_the_law_of_the_current_cell(cells, index):
     governor, state = np.array([4.1, 3.15]), np.array([4.15, 3.2, 0.3, 0.2, -0.1, 0.4])
     inputs = {"object_state": state, "governor_position": governor, "current_cell": [index, 2.0]}
-    system, cell, gains = ReferenceGovernor(cells), cells[index], cells[index].gains
+    system, cell, gains = systems.ReferenceGovernor(cells), cells[index], cells[index].gains
     margin = object_energy_margin(state, governor, cell.clearance(governor), gains.stiffness)
     np.testing.assert_allclose(evaluate(system, inputs, "energy_margin"), [margin], rtol=1e-15)
     velocity, acceleration = np.split(evaluate(system, inputs, "governor_command"), 2)
@@ -89,7 +82,7 @@ INPUTS = {
 
 
 def law_by_hand(axes, position, rate, cell, time):
-    law = axis_laws(PLAN, axes)[cell]
+    law = systems.axis_laws(PLAN, axes)[cell]
     bounds = funnel_bounds(law.funnel, time)
     gains = law.gains
     position_gain, position_gain_rate = ramped_gain(time, gains.position_gain, gains.ramp_rate)
@@ -107,7 +100,7 @@ def law_by_hand(axes, position, rate, cell, time):
 
 
 def test_a_clock_that_lags_shows_earlier_funnels(ppc):
-    paced = AxisPpc(axis_laws(PLAN, AXES), paced=True)
+    paced = systems.AxisPpc(systems.axis_laws(PLAN, AXES), paced=True)
     late = {**INPUTS, "clock": [0.25, 1.0, 0.0]}
     np.testing.assert_array_equal(
         evaluate(paced, late, "funnels", 2.6), evaluate(ppc, INPUTS, "funnels", 2.35)
@@ -124,7 +117,7 @@ def test_all_axes_obey_the_law_since_the_entry_into_the_cell(ppc, cell, time):
 
 
 def test_a_robot_without_joints_tracks_the_angle_alone():
-    system = AxisPpc(axis_laws(PLAN, [0]))
+    system = systems.AxisPpc(systems.axis_laws(PLAN, [0]))
     inputs = {"object_state": INPUTS["object_state"], "current_cell": INPUTS["current_cell"]}
     assert port_sizes(system)[1] == {"axis_acceleration": 1, "funnels": 2}
     acceleration, _ = law_by_hand([0], [0.37], [0.4], 1, 0.6)
@@ -134,7 +127,7 @@ def test_a_robot_without_joints_tracks_the_angle_alone():
 def test_a_robot_that_is_ready_enters_the_next_cell_without_a_step():
     """One step of a simulator, then the switch; a robot that is not ready remembers nothing."""
     for margin, steps in ((0.5, False), (-0.5, True)):
-        system = AxisPpc(axis_laws(PLAN, AXES))
+        system = systems.AxisPpc(systems.axis_laws(PLAN, AXES))
         simulator = Simulator(system)
         context = simulator.get_mutable_context()
         for name, value in {**INPUTS, "current_cell": [0, 0.0], "ready": [0.0, margin]}.items():
@@ -150,7 +143,7 @@ def test_a_robot_that_is_ready_enters_the_next_cell_without_a_step():
 
 def test_from_rest_accelerations_begin_at_zero():
     start = np.array([0.2, 0.1, -0.05])
-    system = AxisPpc(axis_laws(PLAN, AXES), start=start)
+    system = systems.AxisPpc(systems.axis_laws(PLAN, AXES), start=start)
     inputs = {
         "object_state": [0.0, 0.0, start[0], 0.0, 0.0, 0.0],
         "robot_state": [0.0, 0.0, 0.0, *start[1:], *[0.0] * 5],
@@ -168,20 +161,20 @@ def test_a_cell_outside_the_plan_is_refused(ppc, index, output):
 
 
 def test_bad_laws_are_refused():
-    different = [axis_laws(PLAN, [0, 1])[0], axis_laws(PLAN, [0, 1, 2])[1]]
-    for laws in ([], axis_laws(PLAN, []), different):
+    different = [systems.axis_laws(PLAN, [0, 1])[0], systems.axis_laws(PLAN, [0, 1, 2])[1]]
+    for laws in ([], systems.axis_laws(PLAN, []), different):
         with pytest.raises(ValueError, match="AxisPpc needs one law for each cell, all of the same axes"):
-            AxisPpc(laws)
+            systems.AxisPpc(laws)
 
 
 def test_an_axis_that_the_plan_lacks_is_refused():
     with pytest.raises(ValueError, match=r"axes \[1, 4\] are not all in 0 to 3"):
-        axis_laws(PLAN, [1, 4])
+        systems.axis_laws(PLAN, [1, 4])
 
 
 @pytest.fixture
 def ppc():
-    return AxisPpc(axis_laws(PLAN, AXES))
+    return systems.AxisPpc(systems.axis_laws(PLAN, AXES))
 
 
 @cache
@@ -207,7 +200,7 @@ def stepped(system, context, steps):
 
 
 def test_the_reference_moves_alike_whatever_is_measured():
-    system = NominalGovernor(*known())
+    system = systems.NominalGovernor(*known())
     runs = [
         stepped(system, context_with(system, at_place(*place)), 200) for place in ((3.0, 3.0), (9.0, -4.0))
     ]
@@ -216,7 +209,7 @@ def test_the_reference_moves_alike_whatever_is_measured():
 
 
 def test_the_nominal_motion_is_the_flow_behind_the_reference():
-    (cells, motion), system = known(), NominalGovernor(*known())
+    (cells, motion), system = known(), systems.NominalGovernor(*known())
     states, gains = stepped(system, context_with(system, at_place()), 100), cells[0].gains
     flow = nominal_flow(gains.stiffness, gains.damping, motion.period)
     for before, after in pairwise(states):
@@ -227,7 +220,7 @@ def test_the_nominal_motion_is_the_flow_behind_the_reference():
 
 
 def test_the_nominal_motion_never_leaves_its_region_and_the_reference_keeps_its_speed():
-    (cells, motion), system = known(), NominalGovernor(*known())
+    (cells, motion), system = known(), systems.NominalGovernor(*known())
     states = stepped(system, context_with(system, at_place()), 600)
     rooms = [
         nominal_room(cells[0].clearance.edges, cells[0].gains.stiffness, state[:4], state[4:6])
@@ -240,7 +233,7 @@ def test_the_nominal_motion_never_leaves_its_region_and_the_reference_keeps_its_
 
 
 def test_the_command_compares_measurements_with_the_nominal_state_of_their_time():
-    (cells, motion), system = known(), NominalGovernor(*known())
+    (cells, motion), system = known(), systems.NominalGovernor(*known())
     context = context_with(system, at_place())
     states, gains = stepped(system, context, 40), motion.tracking_row(cells[0])
     command = system.GetOutputPort("governor_command").Eval(context)
@@ -254,7 +247,7 @@ def test_the_command_compares_measurements_with_the_nominal_state_of_their_time(
 
 
 def test_what_it_shows():
-    (cells, motion), system = known(), NominalGovernor(*known())
+    (cells, motion), system = known(), systems.NominalGovernor(*known())
     context = context_with(system, at_place())
     state, gains = stepped(system, context, 30)[-1], cells[0].gains
     shown = system.GetOutputPort("nominal").Eval(context)
@@ -267,7 +260,7 @@ def test_what_it_shows():
 
 
 def test_at_rest_the_reference_waits_and_with_half_the_pace_it_is_half_as_fast():
-    system = NominalGovernor(*known(), paced=True)
+    system = systems.NominalGovernor(*known(), paced=True)
     distances = []
     for pace in (0.0, 0.5, 1.0):
         context = context_with(system, {**at_place(), "clock": [0.0, pace, 0.0]})
@@ -281,12 +274,12 @@ def test_at_rest_the_reference_waits_and_with_half_the_pace_it_is_half_as_fast()
 def test_refusals():
     cells, motion = known()
     with pytest.raises(ValueError, match="one target for each cell, not 3 for 0"):
-        NominalGovernor([], motion)
+        systems.NominalGovernor([], motion)
     other = replace(cells[1], gains=replace(cells[1].gains, stiffness=70.0))
     with pytest.raises(ValueError, match="the same K in all cells"):
-        NominalGovernor([cells[0], other, cells[2]], motion)
+        systems.NominalGovernor([cells[0], other, cells[2]], motion)
     with pytest.raises(RuntimeError, match="object_state"):
-        evaluate(NominalGovernor(cells, motion), {"current_cell": [0.0, 0.0]}, "governor_command")
+        evaluate(systems.NominalGovernor(cells, motion), {"current_cell": [0.0, 0.0]}, "governor_command")
     assert BUDGET.period == motion.period
 
 
@@ -299,8 +292,8 @@ MOUNTING = np.array([0.3, -1.0, 0.0])
 
 
 def block(periods=2, axes=3):
-    return NominalAxes(
-        AxisMotion(AxisTracking(500.0, 38.0), START[:axes], 0.005, 0.005, periods, MOUNTING[:axes])
+    return systems.NominalAxes(
+        systems.AxisMotion(AxisTracking(500.0, 38.0), START[:axes], 0.005, 0.005, periods, MOUNTING[:axes])
     )
 
 

@@ -7,16 +7,9 @@ from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.primitives import TrajectorySource, ZeroOrderHold
 from pydrake.trajectories import PiecewisePolynomial
 
+from coop_drake import systems
 from coop_drake.laws.measurements import predict, wanted_accelerations, write_errors
 from coop_drake.plant import build_robot_plant, robot_chain
-from coop_drake.systems import (
-    DisturbanceObserver,
-    Interruption,
-    LossyMeasurement,
-    MeasurementNoise,
-    ShiftedMeasurement,
-    StatePredictor,
-)
 from tests.support.small_scenario import small_scenario
 from tests.support.system_checks import context_with, evaluate
 
@@ -42,13 +35,13 @@ def used(sensor, periods=200, offset=0.0):
 
 @pytest.mark.parametrize(("arguments", "delay"), [({}, 0), ({"late": 1.0, "late_by": 0.2}, 2)])
 def test_a_good_sensor_passes_all_on_at_once_and_all_late_is_a_delay(arguments, delay):
-    numbers = used(LossyMeasurement(1, PERIOD, **arguments))
+    numbers = used(systems.LossyMeasurement(1, PERIOD, **arguments))
     np.testing.assert_allclose(numbers[delay:], range(200 - delay), atol=1e-9)
 
 
 @pytest.mark.parametrize("offset", [0.0, 0.03])
 def test_the_last_measurement_stands_in_for_lost_ones(offset):
-    numbers = used(LossyMeasurement(1, PERIOD, loss=0.5, offset=offset, seed=3), offset=offset)
+    numbers = used(systems.LossyMeasurement(1, PERIOD, loss=0.5, offset=offset, seed=3), offset=offset)
     arrived = [n for n in range(200) if abs(numbers[n] - n) < 1e-6]
     assert 70 < len(arrived) < 130
     first = arrived[0]
@@ -59,7 +52,7 @@ def test_the_last_measurement_stands_in_for_lost_ones(offset):
 @pytest.mark.parametrize("late_by", [0.0, 0.1, 0.25])
 def test_late_ones_are_used_when_they_arrive_unless_a_newer_one_has(late_by):
     periods = {0.0: 1, 0.1: 1, 0.25: 3}[late_by]
-    numbers = used(LossyMeasurement(1, PERIOD, late=0.7, late_by=late_by, seed=5))
+    numbers = used(systems.LossyMeasurement(1, PERIOD, late=0.7, late_by=late_by, seed=5))
     on_time = [n for n in range(200) if abs(numbers[n] - n) < 1e-6]
     assert 35 < len(on_time) < 90
     for period in range(10, 200):
@@ -68,7 +61,7 @@ def test_late_ones_are_used_when_they_arrive_unless_a_newer_one_has(late_by):
 
 
 def test_nothing_new_arrives_when_all_is_lost_and_its_state_at_rest_is_used():
-    sensor = LossyMeasurement(2, PERIOD, loss=1.0)
+    sensor = systems.LossyMeasurement(2, PERIOD, loss=1.0)
     assert evaluate(sensor, {"measured": [4.0, 5.0]}, "received").tolist() == [0.0, 0.0]
     context = sensor.CreateDefaultContext()
     context.SetDiscreteState(sensor.state_at_rest(np.array([1.0, 2.0])))
@@ -76,7 +69,9 @@ def test_nothing_new_arrives_when_all_is_lost_and_its_state_at_rest_is_used():
 
 
 def test_a_seed_decides_what_is_lost():
-    first, again, other = (used(LossyMeasurement(1, PERIOD, loss=0.5, seed=seed), 50) for seed in (1, 1, 2))
+    first, again, other = (
+        used(systems.LossyMeasurement(1, PERIOD, loss=0.5, seed=seed), 50) for seed in (1, 1, 2)
+    )
     np.testing.assert_array_equal(first, again)
     assert np.any(first != other)
 
@@ -85,7 +80,7 @@ def test_a_seed_decides_what_is_lost():
 def test_errors_are_those_of_the_number_of_the_period(time, number):
     errors = np.empty(3)
     write_errors(4, DEVIATIONS, WAVES, number, errors)
-    block = MeasurementNoise(DEVIATIONS, WAVES, PERIOD, 4)
+    block = systems.MeasurementNoise(DEVIATIONS, WAVES, PERIOD, 4)
     measured = evaluate(block, {"exact": [1.0, 2.0, 3.0]}, "measured", time)
     np.testing.assert_allclose(measured, np.array([1.0, 2.0, 3.0]) + errors, atol=1e-15)
 
@@ -96,7 +91,7 @@ WAVES = np.array([[0.3, 4.0, 0.0], [0.0, 1.0, 0.0], [0.1, 3.0, 0.5]])
 
 @pytest.mark.parametrize(("share", "measured"), [(0.25, [2.5, -1.5]), (1.0, [1.0, 0.0]), (-0.5, [4.0, -3.0])])
 def test_it_shows_what_was_or_will_be_by_the_motion_of_the_last_period(share, measured):
-    block = ShiftedMeasurement(2, share, PERIOD)
+    block = systems.ShiftedMeasurement(2, share, PERIOD)
     context = block.CreateDefaultContext()
     block.GetInputPort("exact").FixValue(context, [1.0, 0.0])
     context.SetDiscreteState(block.EvalUniquePeriodicDiscreteUpdate(context))
@@ -105,7 +100,7 @@ def test_it_shows_what_was_or_will_be_by_the_motion_of_the_last_period(share, me
 
 
 def test_what_rests_is_measured_as_it_is():
-    assert evaluate(ShiftedMeasurement(1, 0.7, PERIOD), {"exact": [0.0]}, "measured", 0.3) == [0.0]
+    assert evaluate(systems.ShiftedMeasurement(1, 0.7, PERIOD), {"exact": [0.0]}, "measured", 0.3) == [0.0]
 
 
 def given(block, times):
@@ -123,23 +118,23 @@ def given(block, times):
 
 @pytest.mark.parametrize(("held", "during"), [(True, [1.9, -0.9]), (False, [0.0, 0.0])])
 def test_a_signal_fails_for_its_interval_alone(held, during):
-    block = Interruption(2, PERIOD, begin=1.0, duration=0.5, held=held)
+    block = systems.Interruption(2, PERIOD, begin=1.0, duration=0.5, held=held)
     found = given(block, [0.55, 1.0, 1.25, 1.45, 1.5, 1.75])
     expected = [[1.55, -0.55], during, during, during, [2.5, -1.5], [2.75, -1.75]]
     np.testing.assert_allclose(found, expected, atol=1e-9)
 
 
 def test_without_a_duration_it_never_comes_back():
-    assert np.all(given(Interruption(2, PERIOD, begin=0.0, held=False), [0.0, 1.0, 9.0]) == 0.0)
+    assert np.all(given(systems.Interruption(2, PERIOD, begin=0.0, held=False), [0.0, 1.0, 9.0]) == 0.0)
 
 
 def test_what_is_held_from_the_start_is_what_was_before():
-    block = Interruption(2, 0.1, begin=0.0, held=True, before=-1.0)
+    block = systems.Interruption(2, 0.1, begin=0.0, held=True, before=-1.0)
     np.testing.assert_array_equal(evaluate(block, {"wanted": [3.0, 4.0]}, "given"), [-1.0, -1.0])
 
 
 def test_commands_are_those_wanted_less_the_disturbance():
-    block, ahead = DisturbanceObserver(1, 5.0, 1.0), np.array([0.1, 0.1, -0.1, 0.2])
+    block, ahead = systems.DisturbanceObserver(1, 5.0, 1.0), np.array([0.1, 0.1, -0.1, 0.2])
     inputs = {
         "object_state": [9.0, 9.0, 9.0, 0.1, 0.2, 0.3],
         "robot_state": [9.0, 9.0, 9.0, 9.0, 9.0, 9.0, 9.0, 0.4],
@@ -176,7 +171,7 @@ def robot():
 
 
 def test_it_predicts_by_what_was_commanded_in_the_last_periods(robot):
-    block = StatePredictor(robot, LOAD, 2, SAMPLE)
+    block = systems.StatePredictor(robot, LOAD, 2, SAMPLE)
     simulator = Simulator(block, context_with(block, INPUTS))
     state, pose = np.array(INPUTS["robot_state"]), np.array(INPUTS["object_pose"])
     rows, chain = np.zeros((2, 7)), robot_chain(robot)
@@ -196,4 +191,4 @@ def test_it_predicts_by_what_was_commanded_in_the_last_periods(robot):
 @pytest.mark.parametrize("wrong", [(0, SAMPLE), (2, 0.0)])
 def test_no_delay_and_no_period_are_refused(robot, wrong):
     with pytest.raises(ValueError, match="a delay of one period or more"):
-        StatePredictor(robot, LOAD, *wrong)
+        systems.StatePredictor(robot, LOAD, *wrong)

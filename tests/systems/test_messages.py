@@ -6,18 +6,10 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder, LeafSystem
 from pydrake.systems.primitives import ZeroOrderHold
 
+from coop_drake import systems
 from coop_drake.laws.axis_table import ENERGY_BOUND, track_row
 from coop_drake.laws.measurements import whole_periods
 from coop_drake.laws.ppc import HOLD_RATE, SETTLING_TIME
-from coop_drake.systems import (
-    CellPlanner,
-    FunnelClock,
-    HoldMonitor,
-    HoldReceiver,
-    HoldSupervisor,
-    MessageChannel,
-    axis_laws,
-)
 from coop_drake.systems.holds import RELEASE
 from tests.support.small_plan import small_plan
 from tests.support.system_checks import context_with, evaluate, port_sizes
@@ -66,7 +58,7 @@ def heard(channel, periods=12):
     ],
 )
 def test_a_channel_passes_on_after_whole_periods_of_delay(arguments, periods):
-    channel = MessageChannel(PERIOD, **arguments)
+    channel = systems.MessageChannel(PERIOD, **arguments)
     assert not channel.HasAnyDirectFeedthrough()
     np.testing.assert_array_equal(evaluate(channel, {"sent": [4.0, 1.0]}, "heard"), NEVER)
     assert whole_periods(arguments.get("delay", 0.0), PERIOD) == periods % 12
@@ -74,7 +66,7 @@ def test_a_channel_passes_on_after_whole_periods_of_delay(arguments, periods):
 
 
 def test_a_lost_report_leaves_the_last_one_standing():
-    numbers = heard(MessageChannel(PERIOD, loss=0.5, seed=1), periods=200)
+    numbers = heard(systems.MessageChannel(PERIOD, loss=0.5, seed=1), periods=200)
     arrived = [n for period, n in enumerate(numbers) if n == period]
     assert 70 < len(arrived) < 130
     assert numbers == [max((n for n in arrived if n <= period), default=-1.0) for period in range(200)]
@@ -83,21 +75,21 @@ def test_a_lost_report_leaves_the_last_one_standing():
 def test_where_newer_reports_are_lost_a_repeated_one_is_heard_again():
     """Even after a newer one: a report sent in period n arrives in n + 2, and once more in n + 4."""
     arguments = {"delay": 0.2, "loss": 0.6, "seed": 5}
-    plain = heard(MessageChannel(PERIOD, **arguments), periods=100)
+    plain = heard(systems.MessageChannel(PERIOD, **arguments), periods=100)
     arrived = {n for n in range(98) if plain[n + 2] == n}
     expected, last = [], -1.0
     for period in range(100):
         last = next((n for n in (period - 2, period - 4) if n in arrived), last)
         expected.append(last)
-    assert heard(MessageChannel(PERIOD, repeat=1.0, **arguments), periods=100) == expected
+    assert heard(systems.MessageChannel(PERIOD, repeat=1.0, **arguments), periods=100) == expected
     assert expected != sorted(expected)
 
 
 def test_a_seed_decides_and_every_run_is_the_same():
-    channel = MessageChannel(PERIOD, loss=0.5, seed=7)
+    channel = systems.MessageChannel(PERIOD, loss=0.5, seed=7)
     first = heard(channel, 60)
-    assert heard(MessageChannel(PERIOD, loss=0.5, seed=7), 60) == first
-    assert heard(MessageChannel(PERIOD, loss=0.5, seed=8), 60) != first
+    assert heard(systems.MessageChannel(PERIOD, loss=0.5, seed=7), 60) == first
+    assert heard(systems.MessageChannel(PERIOD, loss=0.5, seed=8), 60) != first
 
 
 def advance(planner, context, until):
@@ -108,7 +100,7 @@ def advance(planner, context, until):
 
 
 def test_a_plan_starts_in_its_first_cell():
-    np.testing.assert_array_equal(evaluate(CellPlanner(2, 3), {}, "current_cell"), [0.0, 0.0])
+    np.testing.assert_array_equal(evaluate(systems.CellPlanner(2, 3), {}, "current_cell"), [0.0, 0.0])
 
 
 @pytest.mark.parametrize(
@@ -124,26 +116,26 @@ def test_a_plan_starts_in_its_first_cell():
     ],
 )
 def test_it_advances_once_when_all_reports_speak_of_the_current_cell(ready, cell):
-    planner = CellPlanner(2, 3)
+    planner = systems.CellPlanner(2, 3)
     context = context_with(planner, {f"robot_{k}_ready": value for k, value in enumerate(ready)})
     # A report that speaks of cell 0 is stale in cell 1: further steps change nothing.
     assert advance(planner, context, 0.5)[0] == cell
 
 
 def test_the_entry_time_is_the_time_of_the_switch():
-    planner = CellPlanner(1, 3)
+    planner = systems.CellPlanner(1, 3)
     context = context_with(planner, {"robot_0_ready": [0.0, 1.0]}, time=2.5)
     assert advance(planner, context, 2.6) == [1.0, 2.5]
 
 
 def test_it_stays_in_the_last_cell_and_says_when_all_have_arrived():
-    planner = CellPlanner(2, 1)
+    planner = systems.CellPlanner(2, 1)
     ready = {"robot_0_ready": [0.0, 1.0], "robot_1_ready": [0.0, 1.0]}
     context = context_with(planner, ready)
     assert advance(planner, context, 0.1) == [0.0, 0.0]
     assert evaluate(planner, ready, "arrived") == [1.0]
     assert evaluate(planner, {**ready, "robot_1_ready": [0.0, -1.0]}, "arrived") == [0.0]
-    assert evaluate(CellPlanner(2, 2), ready, "arrived") == [0.0]
+    assert evaluate(systems.CellPlanner(2, 2), ready, "arrived") == [0.0]
 
 
 class Echo(LeafSystem):
@@ -173,12 +165,12 @@ def wired(planner, channel):
 
 
 def test_reports_that_depend_on_the_cell_close_no_algebraic_loop():
-    diagram = wired(CellPlanner(1, 3), None)
+    diagram = wired(systems.CellPlanner(1, 3), None)
     assert not diagram.HasAnyDirectFeedthrough()
 
 
 def test_a_channel_that_holds_samples_never_switches_twice_on_one_report():
-    planner = CellPlanner(1, 9, period=0.01)
+    planner = systems.CellPlanner(1, 9, period=0.01)
     channel = ZeroOrderHold(period_sec=0.03, offset_sec=0.0, vector_size=2)
     diagram = wired(planner, channel)
     context = diagram.CreateDefaultContext()
@@ -218,7 +210,7 @@ def advanced(simulator, until, **inputs):
 
 @pytest.mark.parametrize("period", [None, 0.01])
 def test_a_clock_stands_still_while_held_and_counts_from_the_entry(period):
-    clock = FunnelClock(period)
+    clock = systems.FunnelClock(period)
     assert port_sizes(clock) == ({"hold": 1, "current_cell": 2}, {"clock": 3})
     simulator = Simulator(clock, context_with(clock, {"hold": [0.0], "current_cell": [0.0, 0.0]}))
     output = clock.GetOutputPort("clock")
@@ -235,7 +227,7 @@ def test_a_clock_stands_still_while_held_and_counts_from_the_entry(period):
 
 
 def test_a_robot_asks_when_its_energy_is_too_large_or_its_margin_negative():
-    monitor = HoldMonitor(axis_laws(HELD_PLAN, [0, 1]), 2.0)
+    monitor = systems.HoldMonitor(systems.axis_laws(HELD_PLAN, [0, 1]), 2.0)
     assert port_sizes(monitor)[1] == {"hold_request": 2}
     simulator = Simulator(monitor, context_with(monitor, MIDDLE))
     request = monitor.GetOutputPort("hold_request")
@@ -250,8 +242,8 @@ def test_a_robot_asks_when_its_energy_is_too_large_or_its_margin_negative():
 
 
 def test_a_robot_asks_above_its_limit_until_the_energy_is_a_share_of_it():
-    law, asked = axis_laws(HELD_PLAN, [0, 1])[0], {}
-    monitor = HoldMonitor([law], 2.0)
+    law, asked = systems.axis_laws(HELD_PLAN, [0, 1])[0], {}
+    monitor = systems.HoldMonitor([law], 2.0)
     simulator = Simulator(monitor, context_with(monitor, MIDDLE))
     request = monitor.GetOutputPort("hold_request")
     for rates, wanted in ((np.arange(0.0, 3.0, 0.002), 1.0), (np.arange(3.0, 0.0, -0.002), 0.0)):
@@ -267,7 +259,7 @@ def test_a_robot_asks_above_its_limit_until_the_energy_is_a_share_of_it():
 
 
 def test_a_robot_that_hears_nothing_holds_by_itself():
-    receiver = HoldReceiver(0.1, period=0.01)
+    receiver = systems.HoldReceiver(0.1, period=0.01)
     assert port_sizes(receiver) == ({"hold_message": 2}, {"hold": 1, "missed": 1})
     simulator = Simulator(receiver, context_with(receiver, {"hold_message": [0.0, 1.0]}))
 
@@ -281,21 +273,21 @@ def test_a_robot_that_hears_nothing_holds_by_itself():
     assert outputs(0.255) == [1.0, 1.0]
     assert outputs(0.275, hold_message=[1.0, 3.0]) == [1.0, 0.0]
     assert outputs(0.295, hold_message=[0.0, 4.0]) == [0.0, 0.0]
-    waiting = HoldReceiver()
+    waiting = systems.HoldReceiver()
     assert evaluate(waiting, {"hold_message": [-1.0, -1.0]}, "hold") == 0.0
     simulator = Simulator(waiting, context_with(waiting, {"hold_message": [0.0, 1.0]}))
     assert waiting.GetOutputPort("hold").Eval(advanced(simulator, 9.0))[0] == 0.0
 
 
 def test_without_a_limit_no_robot_asks():
-    monitor = HoldMonitor(axis_laws(HELD_PLAN, [0, 1]), None)
+    monitor = systems.HoldMonitor(systems.axis_laws(HELD_PLAN, [0, 1]), None)
     inputs = {**MIDDLE, "energy_margin": [-1.0], "object_state": [3.0, 3.0, 0.2, 0.0, 0.0, 99.0]}
     simulator = Simulator(monitor, context_with(monitor, inputs))
     assert monitor.GetOutputPort("hold_request").Eval(advanced(simulator, 0.5))[0] == 0.0
 
 
 def test_the_supervisor_holds_for_every_cause_and_pauses_a_little_longer():
-    supervisor = HoldSupervisor(2, silence=0.35, period=0.1)
+    supervisor = systems.HoldSupervisor(2, silence=0.35, period=0.1)
     quiet = {"order": [0.0], "robot_0_request": [0.0, 1.0], "robot_1_request": [0.0, 1.0]}
     assert port_sizes(supervisor) == (
         {"order": 1, "robot_0_request": 2, "robot_1_request": 2},

@@ -8,6 +8,7 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder, LeafSystem
 from pydrake.systems.primitives import FirstOrderLowPassFilter, ZeroOrderHold
 
+from coop_drake import systems
 from coop_drake.laws import acceleration_at, wrench_share
 from coop_drake.laws.team_dynamics import CREEP_SPEED, base_friction
 from coop_drake.plant import (
@@ -16,16 +17,6 @@ from coop_drake.plant import (
     build_separate_team,
     build_team_plant,
     set_configuration,
-)
-from coop_drake.systems import (
-    FloorFriction,
-    LaggingEffort,
-    LimitedEffort,
-    ObjectEstimator,
-    TeamSensor,
-    WheelSlips,
-    WrenchLaw,
-    build_separate_sensor,
 )
 from tests.support.robot_matrices import turned
 from tests.support.small_scenario import small_scenario
@@ -50,7 +41,7 @@ class Rig:
 
     def measured(self):
         """The object's pose, then every robot's state."""
-        sensor = TeamSensor(self.team)
+        sensor = systems.TeamSensor(self.team)
         values = evaluate(sensor, {"team_state": self.team_state}, "measurements")
         return np.split(values, np.cumsum(sensor.sizes)[:-1])
 
@@ -68,7 +59,7 @@ def rig(request):
 
 
 def test_the_team_sensor_reads_the_object_and_every_robots_base_and_joints(rig):
-    sensor, states = TeamSensor(rig.team), rig.team.plant.num_multibody_states()
+    sensor, states = systems.TeamSensor(rig.team), rig.team.plant.num_multibody_states()
     sizes = [3, *(2 * (3 + len(robot.joints)) for robot in rig.team.robots)]
     assert sensor.sizes == sizes
     assert port_sizes(sensor) == ({"team_state": states}, {"measurements": sum(sizes)})
@@ -90,7 +81,7 @@ def test_the_team_sensor_reads_the_object_and_every_robots_base_and_joints(rig):
 def test_every_robot_finds_the_objects_state_from_its_own_motion(rig):
     for robot in rig.team.robots:
         k, n = robot.index, len(robot.joints)
-        system = ObjectEstimator(build_robot_plant(rig.scenario, k), rig.grasp(k))
+        system = systems.ObjectEstimator(build_robot_plant(rig.scenario, k), rig.grasp(k))
         assert port_sizes(system) == ({"robot_state": 2 * (3 + n), "object_pose": 3}, {"object_state": 6})
         inputs = {"robot_state": rig.robot_state(k), "object_pose": rig.z[:3]}
         known = evaluate(system, inputs, "object_state")
@@ -115,7 +106,7 @@ def teams(request):
 
 def test_the_same_is_measured_in_both_plants(teams):
     (separate, state), (tree, tree_state) = teams
-    sensor, of_tree = build_separate_sensor(separate), TeamSensor(tree)
+    sensor, of_tree = systems.build_separate_sensor(separate), systems.TeamSensor(tree)
     values = evaluate(of_tree, {"team_state": tree_state}, "measurements")
     expected = np.split(values, np.cumsum(of_tree.sizes)[:-1])
     names = ["object_pose", *(f"robot_{robot.index}_state" for robot in separate.robots)]
@@ -148,7 +139,7 @@ def simulated(offset):
     builder.Connect(builder.AddSystem(Wanted()).get_output_port(), hold.get_input_port())
     blocks = [
         builder.AddSystem(block)
-        for block in (LaggingEffort(2, LAG, PERIOD, offset), FirstOrderLowPassFilter(LAG, 2))
+        for block in (systems.LaggingEffort(2, LAG, PERIOD, offset), FirstOrderLowPassFilter(LAG, 2))
     ]
     for block in blocks:
         builder.Connect(hold.get_output_port(), block.get_input_port())
@@ -180,7 +171,7 @@ def test_efforts_are_those_of_a_low_pass_behind_a_hold(offset):
     ],
 )
 def test_a_force_is_limited_by_its_length_and_torques_and_joints_one_by_one(asked, given):
-    limited = evaluate(LimitedEffort(np.array([5.0, 2.0, 0.5])), {"asked": asked}, "given")
+    limited = evaluate(systems.LimitedEffort(np.array([5.0, 2.0, 0.5])), {"asked": asked}, "given")
     np.testing.assert_allclose(limited, given, rtol=1e-14)
 
 
@@ -198,7 +189,7 @@ def test_friction_opposes_motion_and_is_no_stronger_than_stated(vx, vy, coulomb,
 
 
 def test_wheels_that_slip_lose_their_share_for_their_time():
-    block = WheelSlips(np.array([[1.0, np.inf], [2.0, np.inf], [0.3, 0.0]]))
+    block = systems.WheelSlips(np.array([[1.0, np.inf], [2.0, np.inf], [0.3, 0.0]]))
     driven = np.arange(1.0, 7.0)
     for time, left in ((0.9, 1.0), (1.0, 0.7), (1.9, 0.7), (2.0, 1.0)):
         passed = evaluate(block, {"driven": driven}, "passed", time)
@@ -206,7 +197,7 @@ def test_wheels_that_slip_lose_their_share_for_their_time():
 
 
 def test_every_base_has_its_own():
-    block = FloorFriction([1, 0], 30.0, 2.0)
+    block = systems.FloorFriction([1, 0], 30.0, 2.0)
     assert port_sizes(block) == ({"robot_0_state": 8, "robot_1_state": 6}, {"friction_wrenches": 6})
     inputs = {
         "robot_0_state": [1.0, 2.0, 3.0, 4.0, 0.3, 0.4, 5.0, 6.0],
@@ -219,7 +210,7 @@ def test_every_base_has_its_own():
 def test_the_hand_s_command_is_the_law():
     """Acceleration of the grasp and the robot's share of the wrench, from what governor and axes command."""
     p_LE, p_LLcm, wanted = np.array([0.4, 0.1]), np.array([0.05, -0.02]), np.array([1.2, -0.4, 2.0])
-    law = WrenchLaw(p_LE, p_LLcm=p_LLcm, mass=3.0, inertia=0.7, share=0.25, joints=2)
+    law = systems.WrenchLaw(p_LE, p_LLcm=p_LLcm, mass=3.0, inertia=0.7, share=0.25, joints=2)
     inputs = {
         "object_state": [3.8, 3.5, 0.7, 0.3, 0.1, 0.9],
         "governor_command": [7.0, 8.0, 1.2, -0.4],
