@@ -15,7 +15,16 @@ from typing import Concatenate, ParamSpec, TypeVar
 from xml.parsers import expat
 
 from pydrake.geometry import SceneGraph
-from pydrake.multibody.parsing import ModelDirectives, PackageMap, Parser, ProcessModelDirectives
+from pydrake.math import RigidTransform
+from pydrake.multibody.parsing import (
+    AddModel,
+    GetScopedFrameByName,
+    ModelDirective,
+    ModelDirectives,
+    PackageMap,
+    Parser,
+    ProcessModelDirectives,
+)
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import Joint, JointActuator, ModelInstanceIndex, RigidBody
 from pydrake.systems.framework import DiagramBuilder
@@ -175,6 +184,10 @@ def _number(word: str) -> float:
 
 _REPLACED = re.compile(r"invalid inertia|inertia matrix|central inertia|Using default value")
 """Warnings by which Drake says that it went on with a mass or a size other than the file's."""
+_NEEDS_ITS_PLACE = re.compile(r"<include|<world|<!(?!--)|encoding=|<uri>(?!package://)")
+"""What an SDF file has that cannot be read as a text alone."""
+_FROM_TEXT = "<literal-string>.sdf"
+"""How Drake's messages name a text."""
 
 
 def process(
@@ -185,19 +198,72 @@ def process(
     Warnings by which Drake says that it replaced a mass or a size count as errors; all others are passed on
     to Drake's logger. The scene graph receives the geometry, if any is wanted.
     """
-    directives = ModelDirectives(directives=[assembly.directives[index] for index in indices])
     parser = Parser(plant, scene_graph) if scene_graph else Parser(plant)
     parser.package_map().AddMap(_missing(assembly, parser))
+    records, file = list[logging.LogRecord](), ""
     try:
-        with _warnings() as records:
-            ProcessModelDirectives(directives, parser)
+        for text, file, directives in _parts([assembly.directives[index] for index in indices]):
+            with _warnings() as further:
+                if text:
+                    parser.AddModelsFromString(text, "sdf")
+                elif len(directives) == 1 and (weld := directives[0].add_weld):
+                    parent, child = (GetScopedFrameByName(plant, name) for name in (weld.parent, weld.child))
+                    offset = weld.X_PC.GetDeterministicValue() if weld.X_PC else RigidTransform()
+                    plant.WeldFrames(parent, child, offset)
+                else:
+                    ProcessModelDirectives(ModelDirectives(directives=directives), parser)
+            for record in further:
+                record.msg, record.args = record.getMessage().replace(_FROM_TEXT, file), ()
+            records += further
     except (RuntimeError, ValueError, SystemExit) as error:  # pydrake exits where Drake's C++ would abort
-        return " ".join(str(error).split())
+        return " ".join(str(error).replace(_FROM_TEXT, file).split())
     messages = [" ".join(record.getMessage().split()) for record in records]
     replaced = [message for message in messages if _REPLACED.search(message)]
     if not replaced:
         _pass_on(records)
     return "; ".join(dict.fromkeys(replaced))
+
+
+def _parts(directives: list[ModelDirective]) -> Iterator[tuple[str, str, list[ModelDirective]]]:
+    """Return, in order, SDF files as texts with their paths, and between them what Drake shall process alike.
+
+    Of a text Drake's reader keeps what it knows of the format; for every file it would take 30 ms to read
+    that again. Drake welds only what the same call has added, so that welds are parts of their own. Filter
+    groups are resolved together: nothing is divided where there are any.
+    """
+    rest: list[ModelDirective] = []
+    divided = not any(directive.add_collision_filter_group for directive in directives)
+    for directive in directives:
+        text = _sdf_text(directive.add_model) if directive.add_model and divided else ""
+        if not text and not (directive.add_weld and divided):
+            rest.append(directive)
+            continue
+        if rest:
+            yield "", "", rest
+            rest = []
+        yield text, directive.add_model.file.removeprefix("file://") if text else "", [directive]
+    if rest:
+        yield "", "", rest
+
+
+def _sdf_text(model: AddModel) -> str:
+    """Return the text of an SDF file of one model under the directive's name; empty if it needs its place.
+
+    That is so if it includes others, names files by relative paths or starts elsewhere than its zero.
+    """
+    file = Path(model.file.removeprefix("file://"))
+    if file.suffix != ".sdf" or model.default_joint_positions or model.default_free_body_pose:
+        return ""
+    try:
+        text = file.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError):
+        return ""
+    if text.count("<model") != 1 or re.search(
+        r"<include|<world|<!(?!--)|encoding=|<uri>(?!package://)", text
+    ):
+        return ""
+    named, count = re.subn(r"""(<model\s+name\s*=\s*)("[^"]*"|'[^']*')""", rf'\1"{model.name}"', text)
+    return named if count == 1 else ""
 
 
 def _missing(assembly: Assembly, parser: Parser) -> PackageMap:

@@ -3,6 +3,7 @@
 import gc
 import re
 import shutil
+from dataclasses import replace
 from weakref import ref
 
 import numpy as np
@@ -423,13 +424,13 @@ def test_a_digest_of_models_sees_what_a_run_takes_from_them_and_not_where_they_a
 @pytest.fixture
 def readings(monkeypatch):
     """Receives an entry whenever Drake reads models."""
-    made, read = [], parsing.ProcessModelDirectives
+    made, read = [], parsing.process
 
-    def counted(directives, parser):
-        made.append(len(directives.directives))
-        return read(directives, parser)
+    def counted(assembly, indices, *places):
+        made.append(len(indices))
+        return read(assembly, indices, *places)
 
-    monkeypatch.setattr(parsing, "ProcessModelDirectives", counted)
+    monkeypatch.setattr(parsing, "process", counted)
     return made
 
 
@@ -465,6 +466,12 @@ def test_a_robot_that_errs_about_its_masses_leaves_other_robots_of_the_scenario_
     assert len(readings) == 1
     masses = [robot.plant.CalcTotalMass(robot.context) for robot in (light, heavy)]
     assert masses[1] == pytest.approx(2.0 * masses[0])
+
+
+def test_models_that_are_read_as_texts_are_those_that_drake_reads_from_files(scenario, monkeypatch):
+    digest = models_digest(scenario)
+    monkeypatch.setattr(parsing, "_sdf_text", lambda model: "")
+    assert models_digest(replace(scenario)) == digest
 
 
 def test_a_scenario_that_is_loaded_again_reads_changed_models(tmp_path):
