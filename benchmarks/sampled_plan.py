@@ -15,6 +15,7 @@ from coop_drake.laws.nominal import carry_axes as carry_nominal
 from coop_drake.laws.nominal import lag_factors, pulled_axis
 from coop_drake.laws.ppc import fading
 from coop_drake.laws.readiness import axis_ready
+from coop_drake.robustness.alarms import unseen_of
 from coop_drake.tree.pose import FloatArray
 
 HELD, SLOWEST = 0.5, 6.0
@@ -26,7 +27,9 @@ class Departures(NamedTuple):
 
     Attributes:
         factors: Factor by which the model makes accelerations too large, shape (axes,).
-        disturbances: Errors of position, rate and acceleration, shape (samples, axes, 3).
+        disturbances: Errors of position, rate and acceleration, shape (samples, axes, 3); then may follow the
+            departures of position and rate to which something else takes an axis, not a number where nothing
+            does, shape (samples, axes, 5).
         waits: How much longer the axes wait in every cell, because the position does, shape (cells,) [s].
     """
 
@@ -41,14 +44,17 @@ class AxesRun(NamedTuple):
     Attributes:
         nearest: Least distance to a funnel's bound [rad or m], negative where an axis left its funnel or its
             nominal motion never came to rest.
-        farthest: Largest departures from the nominal motions in every cell, shape (cells, axes) [rad or m].
+        farthest: Largest departures from the nominal motions in every cell, then of where their rates take
+            them until a report is used that knows of it, shape (2, cells, axes) [rad or m].
         rooms: Distances to the lower, then to the upper bound at every sample, shape (samples, 2, axes) [rad
             or m].
+        places: The cell, and the number of samples since its entry, at every sample, shape (samples, 2).
     """
 
     nearest: float
     farthest: FloatArray
     rooms: FloatArray
+    places: FloatArray
 
 
 def random_departures(plan: Plan, budget: Budget, seed: int) -> Departures:
@@ -101,18 +107,20 @@ def run_axes(plan: Plan, budget: Budget, departures: Departures) -> AxesRun:
     assert plan.axis_tracking is not None  # there is a budget for the axes
     assert plan.budget is not None
     axes, samples = tables.shape[1], len(departures.disturbances)
-    farthest, rooms = np.zeros((len(tables), axes)), np.zeros((samples, 2, axes))
+    farthest, rooms = np.zeros((2, len(tables), axes)), np.zeros((samples, 2, axes))
+    places = np.zeros((samples, 2))
     nearest, ended = _carry(
         tables,
         plan.start[2:],
         (plan.axis_tracking.stiffness, plan.axis_tracking.damping),
-        np.array([budget.period, budget.lag, plan.budget.lag]),
+        np.array([budget.period, budget.lag, plan.budget.lag, unseen_of(plan.budget)]),
         np.array([whole_periods(time, budget.period) for time in (budget.delay, budget.report_age)]),
         *departures,
         farthest,
         rooms,
+        places,
     )
-    return AxesRun(nearest, farthest, rooms[:ended])
+    return AxesRun(nearest, farthest, rooms[:ended], places[:ended])
 
 
 def _samples(plan: Plan, budget: Budget) -> int:
@@ -176,6 +184,7 @@ def _carry(
     waits: FloatArray,
     farthest: FloatArray,
     rooms: FloatArray,
+    places: FloatArray,
 ) -> tuple[float, int]:
     """Return the least distance to a funnel's bound, and for how many samples the axes were followed.
 
@@ -185,13 +194,14 @@ def _carry(
         tables: The axes in every cell, shape (cells, axes, ``LAW_COLUMNS``).
         start: Where they rest at the beginning, shape (axes,).
         gains: K_a and zeta_a of the pull to the nominal motion.
-        times: Control period, lag of the actuators, and the lag that the nominal motion has [s].
+        times: Control period, lag of the actuators, the lag that the nominal motion has, and t [s].
         periods: Delay of measurements and age of reports in periods.
         factors: The departures, see ``Departures``.
         disturbances: The errors.
         waits: How much longer the axes wait.
         farthest: Receives the largest departures from the nominal motions.
-        rooms: Receives what ``AxesRun`` says.
+        rooms: Receives what ``AxesRun`` says, and so does the next one.
+        places: See there.
     """
     T, lag = times[0], times[1]
     delay, age = int(periods[0]), int(periods[1])
@@ -204,10 +214,15 @@ def _carry(
     old = jumps.copy()
     cell, entered, nearest, former = 0, 0, np.inf, 0
     for k in range(n):
-        ready = True
+        ready, places[k, 0], places[k, 1] = True, cell, k - entered
         for i in range(m):
+            if disturbances.shape[2] > 3 and not np.isnan(disturbances[k, i, 3]):
+                x[i] = nominal[k, 0, i] + disturbances[k, i, 3]
+                v[i] = nominal[k, 1, i] + disturbances[k, i, 4]
             before[k, i, 0], before[k, i, 1] = x[i], v[i]
-            farthest[cell, i] = max(farthest[cell, i], abs(x[i] - nominal[k, 0, i]))
+            e, e_rate = x[i] - nominal[k, 0, i], v[i] - nominal[k, 1, i]
+            farthest[0, cell, i] = max(farthest[0, cell, i], abs(e))
+            farthest[1, cell, i] = max(farthest[1, cell, i], abs(e + times[3] * e_rate))
             lower, upper = bounds_of(tables[cell, i], (k - entered) * T)[:2]
             rooms[k, 0, i], rooms[k, 1, i] = x[i] - lower, upper - x[i]
             following = tables[min(cell + 1, cells - 1), i]

@@ -207,8 +207,12 @@ class Tolerance:
         settled_rate: Largest nominal rate in the end [rad/s or m/s].
         departure: Largest departure of the axis from its nominal motion [rad or m].
         rate_departure: Largest departure of its rate from the nominal one [rad/s or m/s].
-        alarm: Level above which a measured departure of the axis is an alarm [rad or m].
-        rate_alarm: The same for its rate [rad/s or m/s].
+        alarm_times: Times since the entry from which levels hold, the first one 0, shape (stages,) [s].
+        alarm: Of every stage the levels above which a measured departure of an axis is an alarm, each of
+            shape (1 + n,) [rad or m].
+        ahead_alarm: The same for where its rate takes it until a report is used that knows of it, see
+            ``laws/readiness.py`` [rad or m].
+        rate_alarm: The same for its rate, in all stages [rad/s or m/s].
         entry_parts: Into how many parts the positions at the entry are cut, so that these bounds follow [-].
         effort: Largest efforts that robots are told to give: the forces of all bases, their torques, then the
             efforts of all joints; empty where the budget limits none [N, N m].
@@ -226,7 +230,9 @@ class Tolerance:
     settled_rate: Vector
     departure: Vector
     rate_departure: Vector
-    alarm: Vector
+    alarm_times: Vector
+    alarm: tuple[Vector, ...]
+    ahead_alarm: tuple[Vector, ...]
     rate_alarm: Vector
     entry_parts: tuple[Annotated[int, Limits(at_least=1, at_most=64)], ...]
     effort: Vector = field(default_factory=lambda: np.zeros(0))
@@ -308,8 +314,6 @@ class Alarms:
         position: Of the object's measured position, the length of the vector [m].
         velocity: Of its measured velocity, likewise [m/s].
         ahead: Of where both together take it until a report is used that knows of it, likewise [m].
-        axis_reserve: What must be left of the distance of a nominal axis (theta, q...) to its funnel's bounds
-            beside its level, shape (1 + n,), empty where the budget has no axes [rad or m].
         grasp: Of the distance of a grasp from where the measured pose of the base has it; null where the
             budget has no such error [m].
         turn: Of the measured angle of a base, likewise [rad].
@@ -318,7 +322,6 @@ class Alarms:
     position: Bound
     velocity: Bound
     ahead: Bound
-    axis_reserve: Vector
     grasp: Bound | None = None
     turn: Bound | None = None
 

@@ -25,6 +25,9 @@ FORMAT = "coop_drake plan"
 VERSION = 4
 """Version of its layout; another one is refused."""
 
+OTHERWISE_LONG = ("effort", "alarm_times", "alarm", "ahead_alarm")
+"""Lists of a transition that have another number of entries than there are axes."""
+
 
 def save_plan(plan: Plan, path: Path | str) -> Path:
     """Write a plan so that ``load_plan`` gives the same plan back, and saving that the same bytes.
@@ -89,9 +92,22 @@ def read_plan(document: Document) -> Plan:
         parts["tolerance"] = document.entry(f"transitions[{k}]").get("tolerance")
         for part, content in parts.items():
             for name, value in (content or {}).items():
-                if isinstance(value, list) and name != "effort":  # it has other entries
+                if isinstance(value, list) and name not in OTHERWISE_LONG:
                     document.check_length(f"transitions[{k}].{part}.{name}", axes)
+        if parts["tolerance"] is not None:
+            _check_levels(document, f"transitions[{k}].tolerance", axes)
     return plan
+
+
+def _check_levels(document: Document, where: str, axes: int) -> None:
+    """Refuse levels of axes that are not as many as the stages and the axes."""
+    times = document.entry(f"{where}.alarm_times")
+    if not times:
+        document.refuse(f"{where}.alarm_times", times, "at least one time")
+    for name in ("alarm", "ahead_alarm"):
+        document.check_length(f"{where}.{name}", len(times))
+        for i in range(len(times)):
+            document.check_length(f"{where}.{name}[{i}]", axes)
 
 
 # What every executable plan satisfies: targets shared by neighbours, goals inside slices.

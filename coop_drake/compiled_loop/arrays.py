@@ -110,8 +110,9 @@ class LoopNominal(NamedTuple):
         mountings: Those of all robots, see ``place_on_axes``, shape (M,).
         levels: Of the robots' monitors, see ``largest_departure``, shape (5,) or (0,).
         unseen: t there [s].
-        axis_alarms: Levels of all axes and of their rates in every cell, shape (C, 2, M) or (C, 2, 0).
-        reserves: What must be left of the distances of all axes to their funnels' bounds, shape (M,) or (0,).
+        axis_alarms: Levels of all axes, of their rates and of where both take them in every stage of every
+            cell, shape (C, stages, 3, M) or (C, stages, 3, 0).
+        alarm_times: Times since a cell's entry at which its stages begin, shape (C, stages) [s].
         distances: Least distances of (theta, q) to the bounds of their funnels that the budget states for
             every cell, then their largest departures and those of their rates, shape (3, C, 1 + n) or
             (0, 0, 0) [rad or m, and per s].
@@ -124,7 +125,7 @@ class LoopNominal(NamedTuple):
     levels: FloatArray
     unseen: float
     axis_alarms: FloatArray
-    reserves: FloatArray
+    alarm_times: FloatArray
     distances: FloatArray
 
 
@@ -234,7 +235,6 @@ class RobotRoom(NamedTuple):
         pulled: That of the robot's with the pull to the nominal motion, shape (M,).
         later: Nominal axes when efforts act, shape (3, M).
         fading: The jumps of the robot's axes that fade in the cell, shape (M,).
-        levels: Levels of all axes and of their rates, shape (2, M).
         held: Efforts before the sample, shape (3 N + n,) [N, N m].
         errors: Of one measurement, shape (2 (3 + n),).
         line: A line of measurements, then what is measured, shape (rows + 1, 1 + size).
@@ -252,7 +252,6 @@ class RobotRoom(NamedTuple):
     pulled: FloatArray
     later: FloatArray
     fading: FloatArray
-    levels: FloatArray
     held: FloatArray
     errors: FloatArray
     line: FloatArray
@@ -266,7 +265,7 @@ def robot_room(team: LoopTeam, memory: LoopMemory) -> RobotRoom:
     M, state, line = memory.jumps.size, memory.state.size, memory.lines.shape[2:]
     return RobotRoom(
         np.empty(3), np.empty((3, 6)), np.empty((3, state)), np.empty(4), np.empty((team.yaws.size, TOLD)),
-        np.empty(M), np.empty(M), np.empty((3, M)), np.empty(M), np.empty((2, M)),
+        np.empty(M), np.empty(M), np.empty((3, M)), np.empty(M),
         np.empty(memory.efforts.shape[1]), np.empty(state), np.empty((line[0] + 1, line[1])),
         np.empty(memory.channels.shape[1:]), _longest_motion(team), np.empty(NOMINAL_SIZE),
     )  # fmt: skip

@@ -217,7 +217,8 @@ def _nominal(plan: Plan, team: TeamPlant, knowledge: Sequence[RobotKnowledge]) -
     ]
     mountings = np.concatenate([base_chain(team, robot).mounting for robot in team.robots])
     monitored = [known.monitored for known in knowledge if known.monitored is not None]
-    of_axes = [np.empty((len(plan.cells), 2, 0)), *(one.axis_alarms for one in monitored)]
+    times = monitored[0].alarm_times if monitored else np.empty((len(plan.cells), 1))
+    of_axes = [np.empty((*times.shape, 3, 0)), *(one.axis_alarms for one in monitored)]
     gains = none
     if motion is not None:
         gains = np.array([motion.tracking.stiffness, motion.tracking.damping, motion.lag])
@@ -228,7 +229,7 @@ def _nominal(plan: Plan, team: TeamPlant, knowledge: Sequence[RobotKnowledge]) -
         mountings,
         monitored[0].levels if monitored else none,
         monitored[0].unseen if monitored else 0.0,
-        np.ascontiguousarray(np.concatenate(of_axes, axis=2)),
-        np.concatenate([none, *(one.axis_reserve for one in monitored)]),
+        np.ascontiguousarray(np.concatenate(of_axes, axis=3)),
+        times,
         np.array(distances) if motion is not None else np.empty((0, 0, 0)),
     )

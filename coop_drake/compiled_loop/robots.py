@@ -20,13 +20,13 @@ from coop_drake.compiled_loop.arrays import (
     RobotRoom,
 )
 from coop_drake.jit import compiled
-from coop_drake.laws.axis_table import bounds_of, track_axes, write_jumps
+from coop_drake.laws.axis_table import track_axes, write_jumps
 from coop_drake.laws.measurements import NOTHING, carry_measurements, shift_back, uniform_pair, write_errors
 from coop_drake.laws.nominal import carry_axes, place_on_axes, pull_axes
 from coop_drake.laws.readiness import (
     alarm_at,
+    alarm_stage,
     arrival_margin,
-    axis_level,
     clearance_margin,
     largest_departure,
     quiet_margin,
@@ -167,7 +167,7 @@ def compute(
                     at_position = clearance_margin(energy, stiffness, cells.numbers[cell, 0])
                 margin = min(at_position, margin)
         if nominal.levels.size:
-            _monitor(k, sample, now, team, cells, nominal, departures, memory, room, robot)
+            _monitor(k, sample, now, team, nominal, departures, memory, room, robot)
             margin = quiet_margin(margin, memory.alarms[k, 0])
         memory.reports[0, k, 0], memory.reports[0, k, 1] = cell, margin
         if margin >= 0.0 and cell < last_cell:  # The next cell may begin now.
@@ -325,8 +325,8 @@ def _place(
 
 @compiled(inlined=True, borrows=True)
 def _monitor(
-    k: int, sample: int, now: float, team: LoopTeam, cells: LoopCells, nominal: LoopNominal,
-    departures: LoopDepartures, memory: LoopMemory, room: RobotRoom, robot: FloatArray,
+    k: int, sample: int, now: float, team: LoopTeam, nominal: LoopNominal, departures: LoopDepartures,
+    memory: LoopMemory, room: RobotRoom, robot: FloatArray,
 ) -> None:  # fmt: skip
     """Write what the monitor of robot k says, by what it has measured.
 
@@ -335,7 +335,6 @@ def _monitor(
         sample: Number of the sample, or of the next one between two samples.
         now: Time of the run [s].
         team: The robots' models.
-        cells: The plan's cells.
         nominal: The nominal motions.
         departures: What departs.
         memory: What changes.
@@ -343,18 +342,13 @@ def _monitor(
         robot: Its own, shape (2 (3 + n_k),).
     """
     begin, size = k + team.first[2, k], 1 + team.first[2, k + 1] - team.first[2, k]
-    age, own = int(departures.periods[0]), size if nominal.axis_alarms.shape[2] else 0
+    age, own = int(departures.periods[0]), size if nominal.axis_alarms.shape[3] else 0
     made = max(sample - age, 0)
     axes = memory.axes[made % memory.axes.shape[0], :2, begin : begin + own]
-    stated, levels = nominal.axis_alarms, room.levels[:, begin : begin + own]
     then = made * departures.times[0] if age else now
     cell, time = heard_cell(k, made, then, departures.hearing, memory.current)
-    for i in range(own):
-        levels[0, i], levels[1, i] = stated[cell, 0, begin + i], stated[cell, 1, begin + i]
-        if sample >= age:
-            lower, upper = bounds_of(cells.tables[cell, begin + i], time)[:2]
-            reserve = nominal.reserves[begin + i]
-            levels[0, i] = axis_level(levels[0, i], reserve, axes[0, i], lower, upper)
+    stage = alarm_stage(nominal.alarm_times[cell], time)
+    levels = nominal.axis_alarms[cell, stage, :, begin : begin + own]
     led, alarms = memory.nominal[made % memory.nominal.shape[0]], memory.alarms[k]
     chain = team.chains[team.first[0, k] : team.first[0, k + 1]]
     mounting = nominal.mountings[begin : begin + size]

@@ -19,6 +19,7 @@ from coop_drake.plant import RobotPlant, TeamPlant, base_chain, build_robot_plan
 from coop_drake.plant.team import RobotModel
 from coop_drake.scenario import Hold, Scenario
 from coop_drake.systems import AxisMotion, GovernedCell, MonitoredRobot, NominalMotion
+from coop_drake.tree.pose import FloatArray
 
 REPORT_PERIODS = 2
 """Periods in which p_G moves on in the old cell after a report was received [-]: the one in which the switch
@@ -187,8 +188,7 @@ def _monitored(
     if alarms is None or budget is None or deployment.period is None:
         return None
     own = [0, *range(1 + robot.q_slice.start, 1 + robot.q_slice.stop)]
-    stated = [one.tolerance for one in plan.transitions if one.tolerance is not None]
-    axis_alarms = np.array([[one.alarm[own], one.rate_alarm[own]] for one in stated])
+    times, axis_alarms = axis_levels(plan)
     return MonitoredRobot(
         chain=robot_chain(_robot(scenario, robot.index, 1.0)),
         p_LE=np.array([robot.X_LE.x, robot.X_LE.y]),
@@ -200,13 +200,27 @@ def _monitored(
             ]
         ),
         unseen=unseen_time(budget.delay, budget.report_age, budget.period, budget.age_error),
-        axis_alarms=axis_alarms if stated else np.empty((len(plan.cells), 2, 0)),
-        axis_reserve=alarms.axis_reserve[own] if stated else np.empty(0),
+        axis_alarms=axis_alarms[..., own] if axis_alarms.size else axis_alarms,
+        alarm_times=times,
         start=plan.start[[0, 1, *(2 + i for i in own)]],
         period=deployment.period,
         measurement_periods=age,
         offset=deployment.of_robot(robot.name).sample_offset,
     )
+
+
+def axis_levels(plan: Plan) -> tuple[FloatArray, FloatArray]:
+    """Return when the stages of all cells begin, and the levels of all axes in them: ``MonitoredRobot``."""
+    stated = [one.tolerance for one in plan.transitions if one.tolerance is not None]
+    stages = max((one.alarm_times.size for one in stated), default=1)
+    axes = plan.start.size - 2 if stated else 0
+    times, levels = np.full((len(plan.cells), stages), inf), np.empty((len(plan.cells), stages, 3, axes))
+    for k, one in enumerate(stated):
+        times[k, : one.alarm_times.size] = one.alarm_times
+        for i in range(stages):
+            row = min(i, len(one.alarm) - 1)
+            levels[k, i] = one.alarm[row], one.rate_alarm, one.ahead_alarm[row]
+    return times, levels
 
 
 def _field(harmonic_map: HarmonicMap, governor_gain: float) -> VelocityField:

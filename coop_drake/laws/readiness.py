@@ -248,10 +248,12 @@ def _statistics(recent: FloatArray, newest: int, column: int) -> tuple[float, fl
 #
 # t = delay + s + report_age + T
 #
-# passes, s being by how much the age of measurements may be wrong, in which a departure whose rate the
-# noise of rates hides grows by at most n_v t + w t^2 / 2. The plan leaves room for all of it: the strip
-# between the governed sets and their cells is at least a + n_2 + growth wide, and the level of an axis is
-# never more than what its nominal distance d^ to its funnel's bounds leaves, min(a, d^ - n_2 - growth).
+# passes, s being by how much the age of measurements may be wrong, in which its rate takes a departure e to
+# e + t e'. So there is a level of |e + t e'|, too. All between is on the straight way from the one to the
+# other, and what is driven by at most w beside is no farther from it than w t^2 / 2. The plan leaves room for
+# all of it: the strip between the governed sets and their cells is so wide, and so is the distance of a
+# nominal axis to its funnel's bounds, from the sample on for the time t, in the next cell, too, see
+# ``robustness/alarms.py``. The levels of axes change at the times since the entry that the plan states.
 # With a wrong age, n_1 and n_2 hold s times the largest rate, too, for rates s times the largest
 # acceleration.
 #
@@ -294,17 +296,6 @@ def unseen_time(delay: float, report_age: float, period: float, age_error: float
     return (whole_periods(delay, period) + whole_periods(report_age, period) + 1) * period + age_error
 
 
-def growth(rate_noise: float, error: float, time: float) -> float:
-    """Return by how much a departure grows in a time whose rate the noise hides [m or rad].
-
-    Args:
-        rate_noise: n_v [m/s or rad/s].
-        error: w, largest acceleration that the budget allows besides the model's error [m/s^2 or rad/s^2].
-        time: t [s].
-    """
-    return time * (rate_noise + 0.5 * error * time)
-
-
 def departing_name(check: int, joints: tuple[str, ...]) -> str:
     """Return what departs the most, by the number of its level, in words.
 
@@ -315,22 +306,22 @@ def departing_name(check: int, joints: tuple[str, ...]) -> str:
     if check < len(NAMES):
         return NAMES[check]
     axes = ("the object's angle", *joints)
-    number = check - len(NAMES)
-    return axes[number] if number < len(axes) else f"the rate of {axes[number - len(axes)]}"
+    row, number = divmod(check - len(NAMES), len(axes))
+    return ("{}", "the rate of {}", "where {} goes")[row].format(axes[number])
 
 
-@compiled
-def axis_level(alarm: float, reserve: float, position: float, lower: float, upper: float) -> float:
-    """Return the level of an axis at an instant: what its plan states, or what its room leaves [rad or m].
+@compiled(borrows=True)
+def alarm_stage(times: FloatArray, time: float) -> int:
+    """Return the number of the stage of a cell whose levels hold at a time since its entry.
 
     Args:
-        alarm: a [rad or m].
-        reserve: n_2 and the growth [rad or m].
-        position: x^, the nominal position [rad or m].
-        lower: Lower bound of its funnel [rad or m].
-        upper: Upper bound [rad or m].
+        times: When the stages begin, the first one at 0, infinite behind the last one, shape (stages,) [s].
+        time: Time since the entry [s].
     """
-    return min(alarm, min(position - lower, upper - position) - reserve)
+    stage = 0
+    while stage + 1 < times.size and times[stage + 1] <= time:
+        stage += 1
+    return stage
 
 
 @compiled(borrows=True)
@@ -341,8 +332,8 @@ def largest_departure(
 ) -> tuple[float, int]:  # fmt: skip
     """Return the largest measured departure over its level [-], and the number of this level.
 
-    The first five levels are those above, then come those of all axes (theta, q_k), then those of their
-    rates. An axis whose level is not positive departs infinitely.
+    The first five levels are those above, then come those of all axes (theta, q_k), of their rates, and of
+    where both take them.
 
     Args:
         chain: From the robot's base to its end effector.
@@ -355,7 +346,7 @@ def largest_departure(
         axes: x^ and x^' then, shape (2, 1 + n) or more rows; shape (2, 0) where they have no nominal motion.
         levels: Of position, velocity, grasp, angle of the base, infinite where there is none, and of where
             the position goes, shape (5,).
-        axis_levels: Of the axes then, and of their rates, of the shape of ``axes``.
+        axis_levels: Of the axes then, of their rates, and of where both take them, shape (3, 1 + n).
         unseen: t, how far ahead that is [s].
     """
     largest, which, n = 0.0, POSITION, mounting.size - 1
@@ -380,15 +371,12 @@ def largest_departure(
             away = abs(atan2(sin(turn), cos(turn)))
         if away > largest * levels[number]:
             largest, which = away / levels[number], number
-    for row in range(2 if axes.size else 0):
-        for i in range(axes.shape[1]):
-            measured = seen[2 + 3 * row]
-            if i > 0:
-                measured = robot[2 + i] if row == 0 else robot[5 + n + i]
-            away, level = abs(measured - axes[row, i]), axis_levels[row, i]
-            share = away / level if level > 0.0 else inf
-            if share > largest:
-                largest, which = share, 5 + row * axes.shape[1] + i
+    for i in range(axes.shape[1]):
+        e = (robot[2 + i] if i > 0 else seen[2]) - axes[0, i]
+        v = (robot[5 + n + i] if i > 0 else seen[5]) - axes[1, i]
+        for row, off in enumerate((e, v, e + unseen * v)):
+            if abs(off) > largest * axis_levels[row, i]:
+                largest, which = abs(off) / axis_levels[row, i], 5 + row * axes.shape[1] + i
     return largest, which
 
 

@@ -33,7 +33,7 @@ from coop_drake.answers.budget import AxisTracking, Budget
 from coop_drake.jit import compiled
 from coop_drake.laws.measurements import whole_periods
 from coop_drake.laws.nominal import lag_factors
-from coop_drake.robustness.alarms import axis_errors, mistaken
+from coop_drake.robustness.alarms import axis_errors, mistaken, unseen_of
 from coop_drake.robustness.nominal_axes import AxisSets, even_sets
 from coop_drake.tree.pose import FloatArray
 
@@ -59,8 +59,9 @@ SLACK = 1e-3
 """Fraction by which stated bounds are wider than computed ones [-]: more than the responses after
 ``HORIZON`` and another way to round need."""
 
-AWAY, FAST, PULL = range(3)
-"""What responds: e [rad or m], e' [rad/s or m/s] and the pull [rad/s^2 or m/s^2]."""
+AWAY, FAST, PULL, AHEAD = range(4)
+"""What responds: e [rad or m], e' [rad/s or m/s], the pull [rad/s^2 or m/s^2], and e + t e' [rad or m], t
+being how long nobody may know of a departure."""
 
 COMMANDED, PUSH, OLD = range(3)
 """To what: a unit of command in each period, a unit of acceleration, and one from before ``MEMORY``."""
@@ -73,9 +74,9 @@ class AxisLoop:
     Attributes:
         tracking: Its gains.
         budget: The departures to be tolerated.
-        sums: Of every part of the model's range the sums of responses, shape (parts, 3, 3).
+        sums: Of every part of the model's range the sums of responses, shape (parts, 4, 3).
         kicks: Responses to a unit of acceleration in one period within ``MEMORY``, the oldest first, shape
-            (parts, 3, memory).
+            (parts, 4, memory).
         answers: Pull that answers a unit of command in one of the periods before, likewise, with its sign,
             shape (parts, memory).
     """
@@ -102,11 +103,11 @@ class AxisLoop:
         return np.abs(np.array(self.factors) - 1.0) + self.rest
 
     def noises(self, axes: int) -> FloatArray:
-        """Return what noise causes of x [rad or m], x' [rad/s or m/s] and the pull, (axes, parts, 3)."""
+        """Return what noise causes of e, e', the pull and e + t e', shape (axes, parts, 4)."""
         wrong = np.array([[self.budget.angle_noise], [self.budget.rate_noise]])
         wrong = wrong + mistaken(self.budget, self.tracking, axes)
         noise = self.tracking.stiffness * wrong[0] + self.tracking.damping * wrong[1]
-        caused: FloatArray = noise[:, None, None] * (self.sums[:, :, COMMANDED] + [0.0, 0.0, 1.0])
+        caused: FloatArray = noise[:, None, None] * (self.sums[:, :, COMMANDED] + [0.0, 0.0, 1.0, 0.0])
         return caused
 
     def typical(self) -> tuple[float, float]:
@@ -128,10 +129,10 @@ def axis_loop(tracking: AxisTracking, budget: Budget) -> AxisLoop | None:
     T = budget.period
     periods = whole_periods(budget.delay, T), whole_periods(HORIZON, T)
     gains, factors = (tracking.stiffness, tracking.damping), _factors(budget)
-    kicks = np.zeros((len(factors), 3, whole_periods(MEMORY, T)))
+    kicks = np.zeros((len(factors), 4, whole_periods(MEMORY, T)))
     answers = np.zeros(kicks[:, 0].shape)
-    runs = zip(factors, kicks, answers, strict=True)
-    sums = np.array([_sums(gains, T, budget.lag, factor, periods, own, pull) for factor, own, pull in runs])
+    runs, times = zip(factors, kicks, answers, strict=True), (T, budget.lag, unseen_of(budget))
+    sums = np.array([_sums(gains, times, factor, periods, own, pull) for factor, own, pull in runs])
     good = np.isfinite(sums).all() and (_rest(budget) * sums[:, PULL, PUSH] < 1.0).all()
     return AxisLoop(tracking, budget, sums, kicks, answers) if good else None
 
@@ -150,33 +151,31 @@ def _rest(budget: Budget) -> float:
 @compiled
 def _sums(
     gains: tuple[float, float],
-    period: float,
-    lag: float,
+    times: tuple[float, float, float],
     factor: float,
     periods: tuple[int, int],
     kicks: FloatArray,
     answers: FloatArray,
 ) -> FloatArray:
-    """Return the sums of the magnitudes of responses, shape (3, 3), infinite where one does not end.
+    """Return the sums of the magnitudes of responses, shape (4, 3), infinite where one does not end.
 
     An acceleration w within a period acts on the sample after it by (T - t) on e and by 1 on e';
     |h_e (T - t) + h_v| is convex in t, so that its chord is above it.
 
     Args:
         gains: K_a [1/s^2] and zeta_a [1/s].
-        period: T [s].
-        lag: Time constant of the actuators [s].
+        times: T, the time constant of the actuators, and t [s].
         factor: f [-].
         periods: Delay and ``HORIZON`` in periods.
-        kicks: Receives the responses to a unit of acceleration within ``MEMORY``, the oldest first, shape (3,
+        kicks: Receives the responses to a unit of acceleration within ``MEMORY``, the oldest first, shape (4,
             memory).
         answers: Receives the pull that answers a unit of command, likewise, shape (memory,).
     """
-    T, (delay, n), memory = period, periods, kicks.shape[1]
+    (T, lag, unseen), (delay, n), memory = times, periods, kicks.shape[1]
     left, in_v, in_x = lag_factors(T, lag)
     e, v, pull = np.zeros((3, n + 1)), np.zeros((3, n + 1)), np.zeros((3, n + 1))
     e[1, 0], v[2, 0] = 1.0, 1.0  # the runs: a unit command, a unit of e and one of e'
-    q, sums, quiet = np.zeros(3), np.zeros((3, 3)), 0
+    q, sums, quiet, ahead = np.zeros(3), np.zeros((4, 3)), 0, np.zeros((3, n + 1))
     for k in range(n):
         largest = 0.0
         for run in range(3):
@@ -188,7 +187,8 @@ def _sums(
             v[run, k + 1] = v[run, k] + factor * (T * u + in_v * gap)
             q[run] = u + left * gap
             largest = max(largest, abs(e[run, k + 1]) + abs(v[run, k + 1]))
-        for i, h in enumerate((e, v, pull)):
+            ahead[run, k] = e[run, k] + unseen * v[run, k]
+        for i, h in enumerate((e, v, pull, ahead)):
             sums[i, 0] += abs(h[0, k])
             kick = 0.5 * T * (abs(h[1, k] * T + h[2, k]) + abs(h[2, k]))
             sums[i, 1] += kick
@@ -201,7 +201,7 @@ def _sums(
         quiet = quiet + 1 if largest < LEFT else 0
         if quiet > delay + 1:  # nothing that is measured later differs from this
             return sums
-    return np.full((3, 3), np.inf)
+    return np.full((4, 3), np.inf)
 
 
 # How far the axes of a plan may depart from their nominal motions in one transition, period by period.
@@ -245,6 +245,8 @@ class Departures(NamedTuple):
         rate: Largest |e'| [rad/s or m/s].
         acceleration: Largest |e''| [rad/s^2 or m/s^2].
         pull: Largest part of a command that pulls an axis to its nominal motion [rad/s^2 or m/s^2].
+        ahead: Largest |e + t e'| at the period's beginning, t being how long nobody may know of a departure
+            [rad or m].
         entered: d for every part of the model's range, shape (periods + 1, axes, parts).
     """
 
@@ -252,6 +254,7 @@ class Departures(NamedTuple):
     rate: FloatArray
     acceleration: FloatArray
     pull: FloatArray
+    ahead: FloatArray
     entered: FloatArray
 
 
@@ -297,7 +300,7 @@ def departing(
     moving = np.stack([one.moving(samples, budget.period) for one in sets], axis=-1)
     entered = np.empty((*before.past.shape[:3], memory + samples + 1))
     entered[..., :memory] = before.past
-    found, state = np.empty((4, samples + 1, axes)), np.concatenate([before.state, before.state[1:]])
+    found, state = np.empty((5, samples + 1, axes)), np.concatenate([before.state, before.state[1:]])
     left = lag_factors(budget.period, budget.lag)[0]
     error = axis_errors(budget, loop.tracking, axes)
     scales = _Scales(budget.period, budget.model_error, error, loop.rest, left)
@@ -307,9 +310,8 @@ def departing(
     first = min(leaving, samples + 1)
     past = highest[..., first : first + memory].copy()
     of_periods = entered[0, ..., memory:].transpose(2, 1, 0)
-    return Departures(found[0], found[1], found[2], found[3], of_periods), Inflow(
-        past, np.stack([state[0], state[2]])
-    )
+    away = Departures(found[0], found[1], found[2], found[3], found[4], of_periods)
+    return away, Inflow(past, np.stack([state[0], state[2]]))
 
 
 def moving_evenly(loop: AxisLoop, coupling: FloatArray, moving: tuple[float, float]) -> Departures:
@@ -380,24 +382,27 @@ def _rate_terms(coupling: FloatArray, rates: FloatArray) -> float:
 
 
 @compiled(reassociate=True, borrows=True)
-def _answers(kicks: FloatArray, entered: FloatArray, first: FloatArray) -> tuple[float, float, float, float]:
-    """Return the sums of the sizes of the responses times what entered, of x, x' and the pull.
+def _answers(
+    kicks: FloatArray, entered: FloatArray, first: FloatArray
+) -> tuple[float, float, float, float, float]:
+    """Return the sums of the sizes of the responses times what entered, of e, e', the pull and e + t e'.
 
-    The last number is that of x' to ``first`` alone.
+    The last number is that of e' to ``first`` alone.
     """
-    x = v = q = v_first = 0.0
+    x = v = q = ahead = v_first = 0.0
     for m in range(entered.size):
         x += kicks[0, m] * entered[m]
         v += kicks[1, m] * entered[m]
         q += kicks[2, m] * entered[m]
+        ahead += kicks[3, m] * entered[m]
         v_first += kicks[1, m] * first[m]
-    return x, v, q, v_first
+    return x, v, q, ahead, v_first
 
 
 _Responses = tuple[FloatArray, FloatArray, FloatArray, FloatArray]
-"""To a unit of acceleration in one period, the oldest first, shape (parts, 3, memory); sums of those that are
-older, shape (parts, 3); x, x' and the pull that noise causes, shape (axes, parts, 3); largest |epsilon| of
-every part."""
+"""To a unit of acceleration in one period, the oldest first, shape (parts, 4, memory); sums of those that are
+older, shape (parts, 4); e, e', the pull and e + t e' that noise causes, shape (axes, parts, 4); largest
+|epsilon| of every part."""
 
 
 @compiled
@@ -423,22 +428,23 @@ def _carry(
             every period, shape (2, parts, axes, ...).
         state: Largest d until now, lagged pull, and the largest one from the first sample of leaving on; they
             change, shape (3, parts, axes).
-        found: Receives the departures, shape (4, periods, axes).
+        found: Receives the departures, shape (5, periods, axes).
     """
     kicks, late, noise, errors = responses
     parts, axes, memory, ever = len(errors), len(coupling), kicks.shape[2], found.shape[1] - 1
-    now = np.zeros((4, parts, axes))
+    now = np.zeros((5, parts, axes))
     for k in range(ever):
         for p in range(parts):
             for i in range(axes):
                 window = entered[:, p, i, k : memory + k]
-                x, v, q, first = _answers(kicks[p], window[0], window[1])
+                x, v, q, ahead, first = _answers(kicks[p], window[0], window[1])
                 most = state[0, p, i] = max(state[0, p, i], entered[0, p, i, memory + k - 1])
                 now[0, p, i] = noise[i, p, 0] + x + late[p, 0] * most
                 now[1, p, i] = noise[i, p, 1] + v + late[p, 1] * most
                 pull = noise[i, p, 2] + q + late[p, 2] * most
                 now[2, p, i] = max(pull, state[1, p, i])
                 now[3, p, i] = first + late[p, 1] * most
+                now[4, p, i] = noise[i, p, AHEAD] + ahead + late[p, AHEAD] * most
                 state[1, p, i] = pull + scales.left * max(state[1, p, i] - pull, 0.0)
                 if k >= leaving:
                     state[2, p, i] = max(state[2, p, i], now[2, p, i])
@@ -469,12 +475,12 @@ def _enter(
     """Write how far axes depart in one period, and d.
 
     Args:
-        now: Largest |e| and |e'| at its beginning, largest |q| in it, and e'_1 at its beginning, shape (4,
-            parts, axes).
+        now: Largest |e| and |e'| at its beginning, largest |q| in it, e'_1 and |e + t e'| at its beginning,
+            shape (5, parts, axes).
         moving: Largest |x^''| and |x^'| in it, shape (2, axes).
         model: Coefficients of c, and the largest |epsilon| of every part.
         scales: What all axes share.
-        found: Receives |e|, |e'|, |e''| and |q|, shape (4, axes).
+        found: Receives |e|, |e'|, |e''|, |q| and |e + t e'|, shape (5, axes).
         entered: Receives d and the part of it that causes e'_1, shape (2, parts, axes).
     """
     (coupling, errors), T, axes = model, scales.period, moving.shape[1]
@@ -492,7 +498,7 @@ def _enter(
             entered[0, p, i] = entered[1, p, i] + more + scales.rest * now[2, p, i]
             found[0, i] = max(found[0, i], now[0, p, i] + 0.125 * T * T * push)
             found[1, i], found[2, i] = max(found[1, i], now[1, p, i] + T * push), max(found[2, i], push)
-            found[3, i] = max(found[3, i], now[2, p, i])
+            found[3, i], found[4, i] = max(found[3, i], now[2, p, i]), max(found[4, i], now[4, p, i])
 
 
 @compiled
@@ -511,7 +517,7 @@ def _settle(
     """
     (kicks, late, noise, errors), ever = responses, found.shape[1] - 1
     parts, axes, memory = len(errors), moving.shape[1], kicks.shape[2]
-    now, most, flowing = np.zeros((4, parts, axes)), np.zeros((2, parts, axes)), np.zeros((2, parts, axes))
+    now, most, flowing = np.zeros((5, parts, axes)), np.zeros((2, parts, axes)), np.zeros((2, parts, axes))
     for j in range(2):
         for p in range(parts):
             for i in range(axes):
@@ -520,10 +526,9 @@ def _settle(
         for p in range(parts):
             for i in range(axes):
                 state[0, p, i] = max(state[0, p, i], most[0, p, i])
-                for j in range(4):
-                    to = j % 2 if j == 3 else j
-                    caused = kicks[p, to].sum() * most[j // 3, p, i] + late[p, to] * state[0, p, i]
-                    now[j, p, i] = caused + (noise[i, p, j] if j < 3 else 0.0)
+                for j, to, by in ((0, AWAY, 0), (1, FAST, 0), (2, PULL, 0), (3, FAST, 1), (4, AHEAD, 0)):
+                    caused = kicks[p, to].sum() * most[by, p, i] + late[p, to] * state[0, p, i]
+                    now[j, p, i] = caused + (0.0 if by else noise[i, p, to])
                 now[2, p, i] = max(now[2, p, i], state[1, p, i])
         _enter(now, moving, (coupling, errors), scales, found[:, ever], flowing)
         if (flowing <= most).all():

@@ -380,10 +380,16 @@ class AxisSets:
         Args:
             departures: Its largest departures in all periods, the last one for ever, shape (periods + 1,).
         """
-        distances = [tube[:, DISTANCE] - departures[: len(tube)] for tube in self.tubes]
-        least = min(float(some.min()) for some in distances)
+        return float((self.distances(len(departures) - 1) - departures).min())
+
+    def distances(self, samples: int) -> FloatArray:
+        """Return the least distance in all periods, the last one for ever, shape (samples + 1,)."""
+        least = np.full(samples + 1, np.inf)
+        for tube in self.tubes:
+            least[: len(tube)] = np.minimum(least[: len(tube)], tube[:, DISTANCE])
         ended = min(len(tube) for tube in self.tubes)
-        return min(least, self.settled_distance - float(departures[ended:].max()))
+        least[ended:] = np.minimum(least[ended:], self.settled_distance)
+        return least
 
     def moving(self, samples: int, period: float) -> FloatArray:
         """Return the largest |x''| and |x'| in all periods, the last one for ever, shape (2, samples + 1)."""

@@ -30,9 +30,10 @@ class MonitoredRobot:
         levels: Of position, velocity, grasp, angle of the base, infinite where there is none, and of where
             the position goes, shape (5,).
         unseen: How far ahead that is [s].
-        axis_alarms: Of the axes (theta, q_k) in every cell, and of their rates, shape (cells, 2, 1 + n), or
-            (cells, 2, 0) where they have no nominal motion.
-        axis_reserve: What must be left of an axis' distance to its funnel's bounds, shape (1 + n,) or (0,).
+        axis_alarms: Of the axes (theta, q_k) in every stage of every cell, of their rates, and of where both
+            take them, shape (cells, stages, 3, 1 + n), or (cells, 1, 3, 0) where they have no nominal motion.
+        alarm_times: Times since a cell's entry at which its stages begin, infinite for those that it does not
+            have, shape (cells, stages) [s].
         start: (x, y, theta, q_k) at the beginning, shape (3 + n,).
         period: T [s].
         measurement_periods: Age of the measurements in periods [-].
@@ -45,7 +46,7 @@ class MonitoredRobot:
     levels: FloatArray
     unseen: float
     axis_alarms: FloatArray
-    axis_reserve: FloatArray
+    alarm_times: FloatArray
     start: FloatArray
     period: float
     measurement_periods: int
@@ -61,20 +62,19 @@ class DepartureMonitor(Block):
     input   ``nominal``      6          what ``NominalGovernor`` shows; only p^ and p^' are read       W
     input   ``nominal_axes`` 2 (1 + n)  x^ and x^' of the axes (theta, q_k); only where axes have such a
                                         motion
-    input   ``funnels``      2 (1 + n)  lower and upper bounds of the axes; likewise [rad or m]
-    input   ``current_cell`` 2          index of the current cell, time of its entry [-, s]
+    input   ``current_cell`` 2          index of the current cell, time of its entry; likewise [-, s]
     output  ``alarm``        3          0, 1 for a hold or 2 for brakes; the largest departure over its
                                         level, and the number of this level [-]
     ======= ================ ========== ============================================================== =====
 
     State: one discrete group, updated every period: when something was above its level the last time, then
-    p^, p^', x^, x^' and the levels of the axes and of their rates in the last m samples, m being the age of
-    measurements in periods, the latest first.
+    p^, p^', x^, x^' and the levels of the axes, of their rates and of where both take them in the last m
+    samples, m being the age of measurements in periods, the latest first.
     """
 
     def __init__(self, robot: MonitoredRobot) -> None:
         super().__init__()
-        self._robot, self._axes = robot, robot.axis_alarms.shape[2]
+        self._robot, self._axes = robot, robot.axis_alarms.shape[3]
         size = 2 * (2 + robot.mounting.size)
         motion = motion_room(robot.chain)
         self._estimate = partial(estimate_object, robot.chain, robot.p_LE, motion)
@@ -85,7 +85,6 @@ class DepartureMonitor(Block):
         self._led = self.DeclareVectorInputPort("nominal", NOMINAL_SIZE)
         if self._axes:
             self._led_axes = self.DeclareVectorInputPort("nominal_axes", 2 * self._axes)
-            self._funnels = self.DeclareVectorInputPort("funnels", 2 * self._axes)
             self._cell = self.DeclareVectorInputPort("current_cell", CURRENT_CELL_SIZE)
         start = robot.start
         self.DeclareDiscreteState(self.state_at_rest(start[:2], start[2 : 2 + self._axes], 0))
@@ -102,28 +101,27 @@ class DepartureMonitor(Block):
             axes: x^ of the axes that have a nominal motion [rad or m].
             cell: Index of the cell.
         """
-        levels = self._robot.axis_alarms[cell].ravel()
+        levels = self._robot.axis_alarms[cell, 0].ravel()
         row = np.concatenate([position, [0.0, 0.0], axes[: self._axes], np.zeros(self._axes), levels])
         return np.concatenate([[LONG_AGO], *[row] * self._robot.measurement_periods])
 
     def _now(self, context: Context) -> FloatArray:
-        """Return p^, p^', x^, x^' and the levels of now, shape (4 + 4 axes,)."""
+        """Return p^, p^', x^, x^' and the levels of now, shape (4 + 5 axes,)."""
         led = self._led.Eval(context)[:4]
         if not self._axes:
             return led
-        alarms, axes = self._robot.axis_alarms, self._led_axes.Eval(context)
-        lower, upper = self._funnels.Eval(context).reshape(2, -1)
-        levels = alarms[index_of(self._cell.Eval(context), len(alarms))].copy()
-        for i, reserve in enumerate(self._robot.axis_reserve):
-            levels[0, i] = readiness.axis_level(levels[0, i], reserve, axes[i], lower[i], upper[i])
-        return np.concatenate([led, axes, levels.ravel()])
+        alarms, cell = self._robot.axis_alarms, self._cell.Eval(context)
+        index = index_of(cell, len(alarms))
+        stage = readiness.alarm_stage(self._robot.alarm_times[index], context.get_time() - cell[1])
+        return np.concatenate([led, self._led_axes.Eval(context), alarms[index, stage].ravel()])
 
     def _write_alarm(self, context: Context, output: BasicVector) -> None:
         past = self.kept(context)
-        then = past[-(4 + 4 * self._axes) :] if self._robot.measurement_periods else self._now(context)
+        then = past[-(4 + 5 * self._axes) :] if self._robot.measurement_periods else self._now(context)
         measured, seen = self._state.Eval(context), np.empty(6)
         self._estimate(measured, self._pose.Eval(context), seen)
-        axes, levels = then[4:].reshape(2, 2, -1) if self._axes else np.empty((2, 2, 0))
+        of_axes = then[4:].reshape(5, -1) if self._axes else np.empty((5, 0))
+        axes, levels = of_axes[:2], of_axes[2:]
         known = self._robot.levels, levels, self._robot.unseen
         share, which = self._largest(measured, seen, then[:4].copy(), axes, *known)
         output.SetFromVector(

@@ -21,7 +21,18 @@ from coop_drake.errors import RefusalError
 from coop_drake.laws.axis_table import RATE_LIMIT, axis_table
 from coop_drake.laws.measurements import whole_periods
 from coop_drake.laws.readiness import EROSION, RATE_TOLERANCE
-from coop_drake.robustness.alarms import alarms_of, axis_noises, axis_reserve, position_room, rubbed
+from coop_drake.robustness.alarms import (
+    AxisRoom,
+    alarms_of,
+    axis_room,
+    leaving_since,
+    may_miss,
+    of_stage,
+    position_room,
+    rate_noises,
+    room_at_entry,
+    rubbed,
+)
 from coop_drake.robustness.axis_departure import (
     HORIZON,
     AxisLoop,
@@ -81,8 +92,8 @@ def check_budget(plan: Plan, tree: ComponentTree | None = None) -> Check | None:
             if part is not None:
                 raise RefusalError(where, "is stated, but the plan has no budget for the axes")
         return None if budget is None else Check("angles and joints are not part of the budget", 0)
-    alarms, (couplings, efforts) = _alarms(plan), _team(plan, budget, tree)
-    tracking = _tracking(plan, budget)
+    _alarms(plan)  # they are stated
+    tracking, (couplings, efforts) = _tracking(plan, budget), _team(plan, budget, tree)
     if budget.rubs:  # viscous friction counts with the rates that axes never exceed, which is checked below
         pushes = friction_pushes(budget, couplings, np.array(tracking.rate or 0.0))
         _require(np.array(tracking.disturbance), pushes, False, "axis_tracking.disturbance")
@@ -93,6 +104,7 @@ def check_budget(plan: Plan, tree: ComponentTree | None = None) -> Check | None:
     periods = whole_periods(budget.report_age, budget.period)
     entries = [Entry(x, x, rest=x) for x in plan.start[2:].tolist()]
     entered, commanded, smallest = at_rest(loop, axes), nothing_commanded(loop, axes), np.inf
+    missed = np.zeros(axes)
     for k, transition in enumerate(plan.transitions):
         stated, where = transition.tolerance, f"transitions[{k}].tolerance"
         if stated is None:
@@ -102,9 +114,14 @@ def check_budget(plan: Plan, tree: ComponentTree | None = None) -> Check | None:
             raise RefusalError(f"transitions[{k}].gains.funnel", found)
         every, table = _sets(plan, k, stated, entries, conditions)
         leaving = first_leaving(table, every, budget.period)
-        away, entered = departing(loop, every, couplings.rates[k, 1:], entered, leaving)
+        before, (away, entered) = entered, departing(loop, every, couplings.rates[k, 1:], entered, leaving)
         _check_departures(plan, k, table, every, away)
-        _check_axis_alarms(alarms, stated, budget, tracking, where)
+        seen = axis_room(budget, tracking, every, away, before)
+        check_room(
+            missed, room_at_entry(seen, budget), f"{where}.alarm_times", "a monitor in the cell before"
+        )
+        missed = _check_axis_alarms(stated, seen, budget, leaving, where)
+        _check_rate_alarms(stated, budget, tracking, where)
         if limited is not None:
             effort, rates, commanded = transition_efforts(k, limited, every, away, loop, commanded, leaving)
             _check_efforts(stated.effort, effort, rates, limited, f"{where}.effort")
@@ -254,28 +271,65 @@ def _require(stated: FloatArray, found: FloatArray, least: bool, where: str) -> 
 
 
 def _check_axis_alarms(
-    alarms: Alarms, stated: Tolerance, budget: Budget, tracking: AxisTracking, where: str
-) -> None:
-    """Check the levels of the axes in a transition, and that they leave room.
+    stated: Tolerance, seen: AxisRoom, budget: Budget, leaving: int, where: str
+) -> FloatArray:
+    """Check the levels of the axes in a transition, and that what they miss stays in the funnels.
 
-    Where an axis is near a bound of its funnel, its level is what the reserve leaves of the nominal distance.
-    That must be no less than what it may depart from its nominal motion, and a robot's noise.
+    Args:
+        stated: What the transition states.
+        seen: What monitors see and may miss.
+        budget: The budget.
+        leaving: The first sample at which the cell can be left.
+        where: What states it.
+
+    Returns:
+        How far off axes may be when the cell is left, while no report tells of it, shape (axes,) [rad or m].
     """
-    axes = stated.departure.size
-    noises, reserve = axis_noises(budget, tracking, axes), axis_reserve(budget, tracking, axes)
-    for levels, least, place in (
-        (stated.alarm, stated.departure + noises[0], f"{where}.alarm"),
-        (stated.rate_alarm, stated.rate_departure + noises[1], f"{where}.rate_alarm"),
-        (alarms.axis_reserve, reserve, "alarms.axis_reserve"),
-    ):
-        if levels.shape != (axes,):
-            raise RefusalError(place, f"has {levels.size} numbers, not {axes}")
-        for axis, (level, own) in enumerate(zip(levels, least, strict=True)):
-            _require_level(float(level), float(own), f"{place}[{axis}]")
-    for axis, room in enumerate(stated.distance - noises[0]):
-        if not room >= alarms.axis_reserve[axis] - ROUNDING:
-            finding = f"leaves {room:.6g} beside a robot's noise; its monitor needs {reserve[axis]:.6g}"
-            raise RefusalError(f"{where}.distance[{axis}]", finding)
+    times, axes = stated.alarm_times, stated.departure.size
+    if times.size == 0 or times[0] != 0.0 or not (np.diff(times) > 0.0).all():
+        raise RefusalError(f"{where}.alarm_times", f"is {times.tolist()}; times must grow from 0")
+    for name in ("alarm", "ahead_alarm"):
+        shapes = [one.size for one in getattr(stated, name)]
+        if shapes != [axes] * times.size:
+            finding = f"has rows of {shapes} numbers, not {times.size} of {axes}"
+            raise RefusalError(f"{where}.{name}", finding)
+    samples, missed = len(seen.room), np.zeros(axes)
+    first = np.minimum(np.ceil(times / budget.period - ROUNDING), samples).astype(int).tolist()
+    ends = [*first[1:], samples]
+    for i, (begin, end) in enumerate(zip(first, ends, strict=True)):
+        least, room = of_stage(seen, budget, begin, end)
+        levels = np.array([stated.alarm[i], stated.ahead_alarm[i]])
+        for name, level, due in zip(("alarm", "ahead_alarm"), levels, least, strict=True):
+            _require(level, due, False, f"{where}.{name}[{i}]")
+        off = may_miss(budget, levels)
+        check_room(off, room, f"{where}.alarm[{i}]", "its monitor")
+        if end > leaving_since(budget, leaving):
+            missed = np.maximum(missed, off)
+    return missed
+
+
+def _check_rate_alarms(stated: Tolerance, budget: Budget, tracking: AxisTracking, where: str) -> None:
+    """Check the levels of the axes' rates in a transition."""
+    least = stated.rate_departure + rate_noises(budget, tracking, stated.rate_departure.size)
+    if stated.rate_alarm.shape != least.shape:
+        raise RefusalError(f"{where}.rate_alarm", f"has {stated.rate_alarm.size} numbers, not {least.size}")
+    for axis, (level, own) in enumerate(zip(stated.rate_alarm.tolist(), least.tolist(), strict=True)):
+        _require_level(level, own, f"{where}.rate_alarm[{axis}]")
+
+
+def check_room(off: FloatArray, room: FloatArray, where: str, monitor: str) -> None:
+    """Check that axes stay in their funnels while nobody knows of what departs.
+
+    Args:
+        off: How far they may be off their nominal motions, shape (axes,) [rad or m].
+        room: How far they may be off, likewise.
+        where: What states the levels.
+        monitor: Whose levels these are, in words.
+    """
+    for axis, (needed, left) in enumerate(zip(off.tolist(), room.tolist(), strict=True)):
+        if not left >= needed:
+            finding = f"leaves {left:.6g} to a bound of the funnel; {monitor} may miss {needed:.6g}"
+            raise RefusalError(f"{where}[{axis}]", finding)
 
 
 def _require_level(stated: float, least: float, where: str) -> None:
@@ -376,15 +430,13 @@ def _check_tube(plan: Plan, tube: PositionTube, budget: Budget) -> None:
 
 def _check_alarms(stated: Alarms, tube: PositionTube, budget: Budget) -> None:
     """Check the levels of position, velocity and grasp: they follow from the tube and the noise."""
-    due = alarms_of(budget, tube, None, 0)
+    due = alarms_of(budget, tube)
     for name in ("position", "velocity", "ahead", "grasp", "turn"):
         level, least = getattr(stated, name), getattr(due, name)
         if (level is None) != (least is None):
             raise RefusalError(f"alarms.{name}", f"is {level}; the budget has {least}")
         if level is not None:
             _require_level(level, least, f"alarms.{name}")
-    if not budget.axes and stated.axis_reserve.size:
-        raise RefusalError("alarms.axis_reserve", "is stated, but the plan has no budget for the axes")
 
 
 def _check_region(plan: Plan, k: int, room: float) -> float:

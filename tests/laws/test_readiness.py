@@ -114,13 +114,11 @@ def test_a_departure_is_unseen_for_delay_report_and_one_period_in_whole_periods(
     assert readiness.unseen_time(0.011, 0.0, 0.005, 0.001) == pytest.approx(
         0.021
     )  # what clocks hide of the age
-    assert readiness.growth(0.04, 0.2, 0.04) == pytest.approx(0.0016 + 0.00016)
 
 
-def test_the_level_of_an_axis_is_the_stated_one_or_what_its_room_leaves():
-    assert readiness.axis_level(0.02, 0.005, 0.0, -0.1, 0.1) == 0.02
-    assert readiness.axis_level(0.02, 0.005, 0.09, -0.1, 0.1) == pytest.approx(0.005)
-    assert readiness.axis_level(0.02, 0.005, -0.09, -0.1, 0.1) == pytest.approx(0.005)
+@pytest.mark.parametrize(("time", "stage"), [(-0.005, 0), (0.0, 0), (0.29, 0), (0.3, 1), (1.0, 2), (1e9, 2)])
+def test_a_stage_lasts_from_its_time_to_that_of_the_next_one(time, stage):
+    assert readiness.alarm_stage(np.array([0.0, 0.3, 1.0, inf]), time) == stage
 
 
 def test_a_monitor_asks_above_its_level_and_a_little_longer_and_brakes_above_twice_the_level():
@@ -142,12 +140,14 @@ def test_no_robot_is_ready_while_its_monitor_is_not_quiet():
 
 
 def test_levels_have_names():
-    names = [readiness.departing_name(check, ("shoulder", "elbow")) for check in range(11)]
+    names = [readiness.departing_name(check, ("shoulder", "elbow")) for check in range(14)]
     assert names[:6] == [
         "the object's position", "the object's velocity", "its grasp", "the angle of its base",
         "where the object goes", "the object's angle",
     ]  # fmt: skip
-    assert names[6:] == ["shoulder", "elbow", *[f"the rate of {n}" for n in (names[5], "shoulder", "elbow")]]
+    axes = names[5:8]
+    assert axes[1:] == ["shoulder", "elbow"]
+    assert names[8:] == [*(f"the rate of {n}" for n in axes), *(f"where {n} goes" for n in axes)]
 
 
 GOAL = {"goal_lower": np.array([0.8, -0.2]), "goal_upper": np.array([1.0, 0.2])}

@@ -10,7 +10,10 @@ from benchmarks.sampled_plan import random_departures, run_axes, worst_departure
 from coop_drake.answers import Found
 from coop_drake.answers.budget import Budget
 from coop_drake.cli.task import read_task
+from coop_drake.diagram.knowledge import axis_levels
+from coop_drake.laws.readiness import alarm_stage
 from coop_drake.planning.planner import plan
+from coop_drake.robustness.alarms import unseen_of
 from coop_drake.shipped import scenario_file
 
 MOBILE_BASE = Budget(
@@ -38,13 +41,55 @@ def stated(plan, name):
 def test_departures_within_the_budget_never_take_an_axis_farther_than_stated(base, departures, count):
     runs = [run_axes(base, MOBILE_BASE, departures(base, MOBILE_BASE, seed)) for seed in range(count)]
     assert min(run.nearest for run in runs) >= stated(base, "distance").min() > 0.0
-    assert (np.max([run.farthest for run in runs], axis=0) <= stated(base, "departure")).all()
+    away, ahead = np.max([run.farthest for run in runs], axis=0)
+    assert (away <= stated(base, "departure")).all()
+    assert (ahead <= [np.max(one, axis=0) for one in stated_rows(base, "ahead_alarm")]).all()
 
 
 def test_the_worst_departures_use_more_than_half_of_what_is_stated(base):
     runs = [run_axes(base, MOBILE_BASE, worst_departures(base, MOBILE_BASE, seed)) for seed in range(4)]
-    shares = np.max([run.farthest for run in runs], axis=0) / stated(base, "departure")
+    shares = np.max([run.farthest[0] for run in runs], axis=0) / stated(base, "departure")
     assert shares.max(axis=0).min() > 0.5
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_whatever_departs_below_all_levels_stays_in_its_funnel_until_a_report_tells_of_it(base, side):
+    """Something takes all axes as far and as fast as measurements with the worst noise just do not show.
+
+    It does so again and again, at instants in all cells, at hand-overs, too. From then on the error of the
+    model, the error of accelerations and the noise that robots pull with drive them on, within the budget.
+    """
+    budget, t = MOBILE_BASE, unseen_of(MOBILE_BASE)
+    (times, levels), unseen = axis_levels(base), round(t / budget.period)
+    none, hidden = random_departures(base, budget.scaled(0.0), 0), (budget.angle_noise, budget.rate_noise)
+    places = run_axes(base, replace(budget.scaled(0.0), report_age=budget.report_age), none).places
+    assert places[-1, 0] == len(base.cells) - 1
+    generator, least = np.random.default_rng(3), np.inf
+    for attempt in range(30):
+        errors = np.full((*none.disturbances.shape[:2], 5), np.nan)
+        errors[..., :3] = np.multiply([-side, -side, side], [*hidden, budget.acceleration_error])
+        entries = np.flatnonzero(places[:, 1] == 0) + generator.integers(-unseen, 3, len(base.cells))
+        kicked = np.arange(7 * attempt % 60, len(places) - unseen, 60) if attempt % 2 else entries[1:]
+        for k in kicked:
+            heard = max(k - generator.integers(2), 0)  # robots hear of a switch one period late
+            cell, since = int(places[heard, 0]), places[heard, 1] * budget.period
+            a, b, c = levels[cell, alarm_stage(times[cell], since)]
+            x = generator.choice([-1.0, 0.0, 1.0, generator.uniform(-1.0, 1.0)]) * a
+            rate = np.clip((side * c - x) / t, -b, b)
+            errors[k, :, 3] = np.clip(x, -c - t * rate, c - t * rate) + side * hidden[0]
+            errors[k, :, 4] = rate + side * hidden[1]
+        for sign in (side, -side):
+            factors = np.full(len(base.start) - 2, 1.0 + sign * budget.model_error)
+            departs = none._replace(disturbances=errors, factors=factors)
+            run = run_axes(base, replace(budget, lag=budget.lag), departs)
+            for k in kicked[kicked + unseen < len(run.rooms)]:
+                least = min(least, run.rooms[k : k + unseen + 1].min())
+            assert kicked[0] + unseen < len(run.rooms)
+    assert 0.0 < least < 0.002
+
+
+def stated_rows(plan, name):
+    return [getattr(transition.tolerance, name) for transition in plan.transitions]
 
 
 def test_departures_two_and_a_half_times_as_large_lose_an_axis(base):

@@ -122,7 +122,7 @@ def test_whatever_departs_below_all_levels_stays_in_its_room_until_a_report_tell
     """It may be as far and as fast as measurements with the worst noise just do not show."""
     budget, generator = replace(BUDGET, clock_error=clock_error), np.random.default_rng(4)
     (tube,) = position_tubes([GAINS], budget)
-    alarms, room, t = alarms_of(budget, tube, None, 1), position_room(budget, tube), unseen_of(budget)
+    alarms, room, t = alarms_of(budget, tube), position_room(budget, tube), unseen_of(budget)
     assert (
         alarms.velocity * t > room - alarms.position > 0.0
     )  # by its velocity alone it would be seen too late

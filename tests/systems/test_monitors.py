@@ -192,10 +192,7 @@ def inputs(budget=NOISY):
     if not budget.axes:
         return given
     axes = np.array([pose[2], *own[3 : len(own) // 2]])
-    far = np.concatenate([axes - 1.0, axes + 1.0])
-    return given | {
-        "nominal_axes": [*axes, *np.zeros_like(axes)], "funnels": far, "current_cell": [0.0, 0.0],
-    }  # fmt: skip
+    return given | {"nominal_axes": [*axes, *np.zeros_like(axes)], "current_cell": [0.0, 0.0]}
 
 
 def departure_monitor(budget=NOISY):
@@ -207,7 +204,7 @@ def test_ports_and_a_robot_at_rest_on_its_nominal_motion():
     assert port_sizes(block) == (
         {
             "robot_state": 2 * (2 + axes), "object_pose": 3, "nominal": 6, "nominal_axes": 2 * axes,
-            "funnels": 2 * axes, "current_cell": 2,
+            "current_cell": 2,
         },
         {"alarm": 3},
     )  # fmt: skip
@@ -245,19 +242,27 @@ def departures():
         base = pose[:2] + (own[:2] - pose[:2]) @ np.array([[c, s], [-s, c]])
         return {"object_pose": [*pose[:2], pose[2] + size], "robot_state": [*base, own[2] + size, *own[3:]]}
 
-    def turning(size):
+    def turning(size, back=0.5):
+        """It comes from where it is off, as above."""
+        state = slid_round(-back * unseen * size)
         rates = own[n:] + np.array([*(size * turned), size, *np.zeros(n - 3)])
-        return {"robot_state": [*own[:n], *rates]}
+        return {"object_pose": state["object_pose"], "robot_state": [*state["robot_state"][:n], *rates]}
 
-    return {0: moved, 1: faster, 2: slipped, 4: going, 5: slid_round, 5 + n - 2: turning}
+    def turning_on(size):
+        return turning(0.5 * size / unseen, -1.0)
+
+    first = 5 + n - 2
+    return {
+        0: moved, 1: faster, 2: slipped, 4: going, 5: slid_round, first: turning, first + n - 2: turning_on,
+    }  # fmt: skip
 
 
-@pytest.mark.parametrize("check", [0, 1, 2, 4, 5, 5 + 2])
+@pytest.mark.parametrize("check", [0, 1, 2, 4, 5, 5 + 2, 5 + 4])
 def test_what_departs_is_compared_with_its_level(check):
     own = known()[0].monitored
     axes = own.mounting.size
     assert axes == 2
-    level = own.levels[check] if check < 5 else own.axis_alarms[0].ravel()[check - 5]
+    level = own.levels[check] if check < 5 else own.axis_alarms[0, 0].ravel()[check - 5]
     for share, alarm in ((0.9, 0.0), (1.1, 1.0), (2.1, 2.0)):
         measured = departures()[check](share * level)
         found = evaluate(departure_monitor(), inputs() | measured, "alarm")
@@ -272,17 +277,22 @@ def test_a_base_that_is_turned_against_its_object_and_joints_is_seen():
         np.testing.assert_allclose(found, [alarm, share, 3.0], rtol=1e-9)
 
 
-def test_an_axis_near_a_bound_of_its_funnel_has_the_level_that_its_room_leaves():
+def test_levels_of_axes_are_those_of_the_cell_and_the_stage_in_which_the_measurements_were_made():
     own, given = known()[0].monitored, inputs()
-    axes = np.array(given["nominal_axes"][:2])
-    reserve, alarm = own.axis_reserve[1], own.axis_alarms[0, 0, 1]
-    near = np.array([axes[0] - 1.0, axes[1] - 1.0, axes[0] + 1.0, axes[1] + reserve + 0.5 * alarm])
-    block, moved = departure_monitor(), np.array([axes[0], axes[1] - 0.25 * alarm, 0.0, 0.0])
-    simulator = Simulator(block, context_with(block, given | {"funnels": near, "nominal_axes": moved}))
-    simulator.AdvanceTo((DELAY + 0.5) * own.period)
-    alarm_now, share, which = block.GetOutputPort("alarm").Eval(simulator.get_context())
-    assert (alarm_now, which) == (0.0, 6.0)
-    assert share == pytest.approx(0.25 / 0.75, rel=1e-6)
+    times, levels = np.array([[0.0, 1.6 * own.period]] * 3), np.ones((3, 2, 3, 2))
+    levels[0, 1, 0, 1], levels[1, 0, 0, 1] = 0.5, 0.25
+    block = DepartureMonitor(replace(own, axis_alarms=levels, alarm_times=times))
+    axes = given["nominal_axes"]
+    given["nominal_axes"] = [axes[0], axes[1] + 0.1, *axes[2:]]
+    simulator = Simulator(block, context_with(block, given))
+    context, alarm = simulator.get_mutable_context(), block.GetOutputPort("alarm")
+    simulator.AdvanceTo(2.5 * own.period)
+    assert list(alarm.Eval(context)[1:]) == pytest.approx([0.1, 6.0], rel=1e-6)
+    simulator.AdvanceTo(3.5 * own.period)
+    block.GetInputPort("current_cell").FixValue(context, [1.0, 3.5 * own.period])
+    for periods, expected in ((3.6, 0.2), (4.5, 0.2), (5.5, 0.4), (6.5, 0.4), (7.5, 0.1)):
+        simulator.AdvanceTo(periods * own.period)
+        assert alarm.Eval(context)[1] == pytest.approx(expected, rel=1e-6)
 
 
 def test_measurements_are_compared_with_the_nominal_state_of_their_stamp():

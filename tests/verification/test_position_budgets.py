@@ -145,9 +145,6 @@ def test_another_level_of_a_monitor_is_refused(name, factor):
 
 def test_levels_must_be_there_and_leave_room_in_the_cells():
     assert refusal(replace(plan(), alarms=None)) == "alarms"
-    assert refusal(replace(plan(), alarms=replace(plan().alarms, axis_reserve=np.ones(3)))) == (
-        "alarms.axis_reserve"
-    )
     later = replace(plan(), budget=replace(plan().budget, report_age=plan().budget.report_age + 0.005))
     assert refusal(later) == "tube.ahead"
     time = BUDGET.delay + BUDGET.report_age + BUDGET.period

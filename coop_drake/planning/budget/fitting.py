@@ -28,7 +28,15 @@ from coop_drake.laws.gains import IDEAL_AGE, RestCondition
 from coop_drake.laws.measurements import whole_periods
 from coop_drake.laws.readiness import EROSION, RATE_TOLERANCE
 from coop_drake.planning.transitions import share_speeds, with_gains
-from coop_drake.robustness.alarms import axis_noises, least_distance
+from coop_drake.robustness.alarms import (
+    AxisRoom,
+    axis_room,
+    leaving_since,
+    may_miss,
+    of_stage,
+    rate_noises,
+    room_at_entry,
+)
 from coop_drake.robustness.axis_departure import (
     HORIZON,
     PULL,
@@ -107,6 +115,22 @@ class UnprovedTransition:
 
 
 @dataclass(frozen=True)
+class AxisAlarms:
+    """The levels of monitors of axes in one transition.
+
+    Attributes:
+        first: First samples of the stages.
+        levels: Of |e| and |e + t e'| in every stage, shape (stages, 2, axes) [rad or m].
+        missed: How far off axes may be when the cell is left, while no report tells of it, shape (axes,) [rad
+            or m].
+    """
+
+    first: list[int]
+    levels: FloatArray
+    missed: FloatArray
+
+
+@dataclass(frozen=True)
 class ProvedTransition:
     """One transition for which a budget holds.
 
@@ -117,6 +141,7 @@ class ProvedTransition:
         spare: Least distances of the axes to their funnels' bounds, shape (axes,) [rad or m].
         departure: Largest departures from them, shape (axes,) [rad or m].
         rate_departure: Largest departures of the rates, shape (axes,) [rad/s or m/s].
+        alarms: The levels of monitors.
         reached: Largest rates and accelerations of the axes, departures included, shape (2, axes).
         effort: Largest efforts, as a ``Tolerance`` states them.
         inflow: What has entered the loops of its axes when the next one begins.
@@ -130,6 +155,7 @@ class ProvedTransition:
     spare: FloatArray
     departure: FloatArray
     rate_departure: FloatArray
+    alarms: AxisAlarms
     reached: FloatArray
     effort: FloatArray
     inflow: Inflow
@@ -197,17 +223,20 @@ def _attempt(
     if isinstance(every, UnprovedTransition):
         return every
     leaving = first_leaving(table, every, T)
-    found, inflow = departing(loop, every, coupling, inflow, leaving)
+    found, following = departing(loop, every, coupling, inflow, leaving)
     found = Departures(*((1.0 + OTHERWISE) * one for one in found))
     departure, rate_departure, push = (one.max(axis=0) for one in found[:3])
     spare = np.array([(1.0 - SLACK) * sets.spare(found.position[:, i]) for i, sets in enumerate(every)])
-    needed = least_distance(budget, loop.tracking, len(every))
+    if not (spare > 0.0).all():
+        return UnprovedTransition(k, int(spare.argmin()), "may leave its funnel")
+    seen = axis_room(budget, loop.tracking, every, found, inflow)
+    seen = seen._replace(room=(1.0 - SLACK) * seen.room)
+    missed = before.alarms.missed if isinstance(before, ProvedTransition) else 0.0 * spare
+    alarms = _alarms(seen, budget, leaving, missed)
+    if isinstance(alarms, int):
+        return UnprovedTransition(k, alarms, "may leave its funnel before its monitor sees it")
     reached = np.empty((2, len(every)))
     for axis, sets in enumerate(every):
-        if not spare[axis] > 0.0:
-            return UnprovedTransition(k, axis, "may leave its funnel")
-        if not spare[axis] > needed[axis]:
-            return UnprovedTransition(k, axis, "may leave its funnel before its monitor sees it")
         reached[0, axis] = (1.0 + SLACK) * sets.fastest(found.rate[:, axis], T)
         reached[1, axis] = (1.0 + SLACK) * sets.acceleration + push[axis]
         if not reached[0, axis] < table[axis, RATE_LIMIT]:
@@ -229,8 +258,41 @@ def _attempt(
             most = f"{effort[worst]:.0f}, more than its {of.limits[worst]:.0f}"
             return UnprovedTransition(k, None, f"{of.names[worst]} may be told to give {most}")
     return ProvedTransition(
-        table, entries, every, spare, departure, rate_departure, reached, effort, inflow, commanded
+        table, entries, every, spare, departure, rate_departure, alarms, reached, effort, following, commanded
     )
+
+
+def _alarms(seen: AxisRoom, budget: Budget, leaving: int, missed: FloatArray) -> AxisAlarms | int:
+    """Return the levels of monitors in as few stages as leave room; or the first axis that has too little.
+
+    A stage begins where reports begin that may be used when the cell is left, so that the next one need not
+    have room for what departs earlier.
+
+    Args:
+        seen: What monitors see and may miss.
+        budget: The budget.
+        leaving: The first sample at which the cell can be left.
+        missed: How far off axes may be that a monitor in the cell before has missed, shape (axes,).
+    """
+    samples, since, first, every = len(seen.room), leaving_since(budget, leaving), list[int](), []
+    begin, room = 0, room_at_entry(seen, budget) - missed
+    while begin < samples and room.min() >= 0.0:
+        low, high = begin + 1, since if begin < since else samples
+        while low < high:  # by bisection the last sample at which it may end
+            middle = (low + high + 1) // 2
+            levels, room = of_stage(seen, budget, begin, middle)
+            low, high = (middle, high) if (may_miss(budget, levels) <= room).all() else (low, middle - 1)
+        levels, room = of_stage(seen, budget, begin, low)
+        room -= may_miss(budget, levels)
+        first.append(begin)
+        every.append(levels)
+        begin = low
+    if room.min() < 0.0:
+        return int(room.argmin())
+    leave = [
+        may_miss(budget, one) for one, end in zip(every, [*first[1:], samples], strict=True) if end > since
+    ]
+    return AxisAlarms(first, np.array(every), np.max(leave, axis=0))
 
 
 def _entries(before: ProvedTransition, conditions: AxisConditions, periods: int) -> list[Entry]:
@@ -454,7 +516,7 @@ def _stated(transition: Transition, passed: ProvedTransition, factor: float, loo
 
 def _tolerance(factor: float, passed: ProvedTransition, loop: AxisLoop) -> Tolerance:
     entries, every = passed.entries, passed.sets
-    noise, rate_noise = axis_noises(loop.budget, loop.tracking, len(every))
+    first, levels = np.array(passed.alarms.first), passed.alarms.levels
     return Tolerance(
         age_factor=factor,
         entry_lower=np.array([entry.lower for entry in entries]),
@@ -468,8 +530,10 @@ def _tolerance(factor: float, passed: ProvedTransition, loop: AxisLoop) -> Toler
         settled_rate=np.array([(1.0 + SLACK) * sets.settled_rate for sets in every]),
         departure=passed.departure,
         rate_departure=passed.rate_departure,
-        alarm=passed.departure + noise,
-        rate_alarm=passed.rate_departure + rate_noise,
+        alarm_times=loop.budget.period * np.maximum(first - 0.5, 0.0),
+        alarm=tuple(levels[:, 0]),
+        ahead_alarm=tuple(levels[:, 1]),
+        rate_alarm=passed.rate_departure + rate_noises(loop.budget, loop.tracking, len(every)),
         effort=passed.effort,
         entry_parts=tuple(sets.parts for sets in every),
     )

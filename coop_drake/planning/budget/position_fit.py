@@ -168,7 +168,7 @@ def _fastest(
         found = _within(problem, uniform, tube, position_room(budget, tube))
         if isinstance(found, UnprovedPosition):
             continue
-        alarms = alarms_of(budget, tube, plan.axis_tracking, plan.start.size - 2)
+        alarms = alarms_of(budget, tube)
         found = timed(replace(found, alarms=alarms))
         if best is not None and plan_time(best) <= plan_time(found):
             break
