@@ -86,7 +86,7 @@ def false_alarm_chance(scenario: Scenario, plan: Plan, robots: int, samples: int
     of_plane = _ratios(plan, pull, mean, np.array([position_std, velocity_std]), PLANE_DEVIATIONS)
     of_axis = np.array([measured.angle_noise, measured.rate_noise])
     gains = tracking.stiffness, tracking.damping
-    ratios = _ratios(plan, gains, of_axis, of_axis, DEVIATIONS)[:2]
+    ratios = _ratios(plan, gains, of_axis, of_axis, DEVIATIONS)
     in_plane = sum(_rayleigh(ratio) for ratio in of_plane) + _rayleigh(GRASP_DEVIATIONS)
     axes = 1 + len(plan.joint_names) / robots
     of_numbers = axes * sum(_normal(ratio) for ratio in ratios) + _normal(GRASP_DEVIATIONS)
