@@ -22,7 +22,7 @@ from coop_drake.typed_data import DataError, convert_class
 from coop_drake.verification import verify_plan
 from tests.support.scenarios import MODELS, write_scenario
 
-FRICTION = {"coulomb": 0.2, "viscous": 0.02}
+FRICTION = {"coulomb": 0.12, "viscous": 0.02}
 
 
 GOAL = {
