@@ -66,6 +66,7 @@ def update(
 ) -> None:  # fmt: skip
     """Do all that is done at a sample, and carry what is between the robots over a period."""
     period, channels = departures.times[0], memory.channels
+    instant, early = sample * period, EARLY * period
     for i in range(room.held.size):
         room.held[i] = memory.efforts[0, i]
     compute(sample, sample, sample * period, False, cells, team, nominal, departures, room, memory)
@@ -74,7 +75,7 @@ def update(
     for k in range(team.yaws.size):
         first, last = team.first[2, k], team.first[2, k + 1]
         begin, end, motors = departures.silences[0, k], departures.silences[1, k], departures.silences[2, k]
-        silent = _within(begin, end, sample, period)
+        silent = begin - early <= instant < end - early
         stands, other = (1, 0) if silent else (0, 1)  # While a robot is silent, its last report stands.
         for i in range(memory.reports.shape[2]):
             memory.reports[other, k, i] = memory.reports[stands, k, i]
@@ -128,6 +129,7 @@ def advance(
     Efforts follow what is held as exponentials, exactly. A step of 5 ms errs by 1e-8 of the distances moved.
     """
     period, n = departures.times[0], memory.state.size // 2
+    instant, early = sample * period, EARLY * period
     sticks = departures.friction[0] > 0.0 or departures.friction[1] > 0.0
     state, start, change, slopes = room.states[0], room.states[1], room.states[2], room.slopes
     robots, wrenches, efforts, floor = team.yaws.size, room.wrenches, room.efforts, departures.floor
@@ -137,7 +139,7 @@ def advance(
         state[i], start[i], change[i] = memory.state[i], memory.state[i], 0.0
     for k in range(room.blocked.size):
         begin, end = departures.blocked[0, k], departures.blocked[1, k]
-        room.blocked[k] = 1.0 if _within(begin, end, sample, period) else 0.0
+        room.blocked[k] = 1.0 if begin - early <= instant < end - early else 0.0
         sticks = sticks or room.blocked[k] > 0.0
     for stage in range(4):
         ahead = 0.0 if stage == 0 else period if stage == 3 else 0.5 * period
@@ -147,7 +149,7 @@ def advance(
             wrenches[robots, i] = 0.0
         for k in range(robots):
             first, own, left = team.first[2, k], 3 * k + team.first[2, k], 1.0
-            if _within(departures.slips[0, k], departures.slips[1, k], sample, period):
+            if departures.slips[0, k] - early <= instant < departures.slips[1, k] - early:
                 left -= departures.slips[2, k]
             for i in range(3):
                 wrenches[k, i] = left * memory.efforts[1, own + i]
@@ -163,7 +165,7 @@ def advance(
                 wrenches[k, 1] += fy
         for push in range(departures.pushes.shape[0]):
             row = departures.pushes[push]
-            if row[BEGIN] <= sample * period + ahead < row[END]:
+            if row[BEGIN] <= instant + ahead < row[END]:
                 for i in range(3):
                     wrenches[int(row[0]), i] += row[1 + i]
         if sticks:
@@ -184,10 +186,3 @@ def advance(
             state[n + i] = start[n + i] + further * slopes[i]
     for i in range(2 * n):
         memory.state[i] += change[i]
-
-
-@compiled(borrows=True)
-def _within(begin: float, end: float, sample: int, period: float) -> bool:
-    """Whether a period begins in an interval of time [s]."""
-    early = EARLY * period
-    return bool(begin - early <= sample * period < end - early)

@@ -123,14 +123,16 @@ def compute(
         for i in range(begin, end):
             room.fading[i] = memory.jumps[i] if memory.jumped[k] == cell else 0.0
         acts = 0
-        if axes_led:
-            acts = 2
+        if axes_led:  # The law acts on the nominal axes of now; efforts will act on later ones.
+            acts, gains, mounting = 2, nominal.axis_gains, nominal.mountings[begin:end]
             axes = memory.axes[sample % memory.axes.shape[0], :, begin:end]
             then = memory.axes[seen_at % memory.axes.shape[0], :2, begin:end]
-            _follow_led_axes(
-                table, time, period, jumps, nominal.axis_gains, nominal.mountings[begin:end], axes, then,
-                room.seen, room.robots, size, law, room.pulled[begin:end], room.later[:, begin:end],
-            )  # fmt: skip
+            led_robot, later = room.robots[1, :size], room.later[:, begin:end]
+            _place(axes, mounting, seen, robot, room.seen[1], led_robot)
+            track_axes(table, time, ON_TIME, jumps, room.seen[1], led_robot, law)
+            pull_axes(law, seen, robot, then, (gains[0], gains[1]), room.pulled[begin:end])
+            carry_axes(axes, law, 0.5 * period + gains[2], gains[2], later)
+            _place(later, mounting, seen, robot, room.seen[2], room.robots[2, :size])
         else:
             track_axes(table, time, ON_TIME, jumps, seen, robot, law)
         asked = room.pulled[begin:end] if axes_led else law
@@ -276,37 +278,6 @@ def heard_cell(
         return 0, now
     entered = current[heard % current.shape[0]]
     return int(entered[0]), now - (entered[1] - hearing[0, k])
-
-
-@compiled(borrows=True)
-def _follow_led_axes(
-    table: FloatArray, time: float, period: float, jumps: FloatArray, gains: FloatArray,
-    mounting: FloatArray, now: FloatArray, then: FloatArray, seen: FloatArray, robots: FloatArray, size: int,
-    law: FloatArray, pulled: FloatArray, later: FloatArray,
-) -> None:  # fmt: skip
-    """Write what the law asks of axes that have a nominal motion, and the pull towards this motion.
-
-    Args:
-        table: The robot's axes in its cell.
-        time: Time since the cell's entry [s].
-        period: T [s].
-        jumps: Jumps that fade.
-        gains: See ``LoopNominal.axis_gains``.
-        mounting: That of its base, see ``place_on_axes``.
-        now: x^, x^' and a^ of its axes.
-        then: x^ and x^' when its measurements were made.
-        seen: See ``RobotRoom``; row 0 holds the object's state, rows 1 and 2 are written.
-        robots: Likewise the robot's own state.
-        size: Its size.
-        law: Receives what the law asks for.
-        pulled: Receives the same with the pull.
-        later: Receives the nominal axes of when efforts act.
-    """
-    _place(now, mounting, seen[0], robots[0, :size], seen[1], robots[1, :size])
-    track_axes(table, time, ON_TIME, jumps, seen[1], robots[1, :size], law)
-    pull_axes(law, seen[0], robots[0, :size], then, (gains[0], gains[1]), pulled)
-    carry_axes(now, law, 0.5 * period + gains[2], gains[2], later)
-    _place(later, mounting, seen[0], robots[0, :size], seen[2], robots[2, :size])
 
 
 @compiled(borrows=True)

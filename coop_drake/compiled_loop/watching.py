@@ -25,8 +25,7 @@ from coop_drake.geometry.polygons import signed_distance
 from coop_drake.jit import compiled
 from coop_drake.laws.axis_table import bounds_of
 from coop_drake.simulation.clearance import pair_apart, piece_to_walls, place_pieces
-from coop_drake.tree.pose import FloatArray, IntArray
-from coop_drake.tree.team_arrays import TeamArrays
+from coop_drake.tree.pose import FloatArray
 
 ROUNDING = 1e-9
 """More than what rounding errors change of a distance and of the way of a run [m]."""
@@ -131,8 +130,48 @@ def watch(
         margin = min(z[2 + i] - lower, upper - z[2 + i])
         if not margin > 0.0:
             end(figures, OUT_OF_SLICE, margin, i)
-    edges = cells.regions[cells.first[1, cell] : cells.first[1, cell + 1]]
-    _watch_distances(cell, edges, plant.shapes, plant.walls, plant.reach, room, figures)
+
+    # The distance to the cell's boundary and clearances; the run ends where one is not positive.
+    last, way, x, y, shapes, reach = room.region, room.way, z[0], z[1], plant.shapes, plant.reach
+    if not (last[0] == cell and last[1] - hypot(x - last[2], y - last[3]) > figures[REGION] + ROUNDING):
+        inside = signed_distance(cells.regions[cells.first[1, cell] : cells.first[1, cell + 1]], x, y)
+        last[0], last[1], last[2], last[3] = cell, inside, x, y
+        figures[REGION] = min(figures[REGION], inside)
+        if not inside > 0.0:
+            end(figures, OUT_OF_REGION, inside)
+    between = 0.0
+    for i in range(1, reach.size):
+        between += reach[i] * abs(z[2 + i] - room.last_z[2 + i])
+    moved = hypot(x - room.last_z[0], y - room.last_z[1]) + reach[0] * abs(z[2] - room.last_z[2])
+    moved += between
+    if moved >= 0.0:  # Not NaN: there was a configuration before.
+        way[0] += moved
+        way[1] += 2.0 * between
+    for i in range(z.size):
+        room.last_z[i] = z[i]
+    placed = False
+    for i in range(len(shapes.pieces)):
+        if room.walls[i, 0] - (way[0] - room.walls[i, 1]) > figures[WALL] + ROUNDING:
+            continue
+        if not placed:
+            place_pieces(shapes, z, room.poses, room.vertices, room.discs)
+            placed = True
+        distance = piece_to_walls(shapes, room.vertices, room.discs, plant.walls, i, inf)
+        room.walls[i, 0], room.walls[i, 1] = distance, way[0]
+        figures[WALL] = min(figures[WALL], distance)
+    for i in range(len(shapes.pairs)):
+        if room.pairs[i, 0] - (way[1] - room.pairs[i, 1]) > figures[BODY] + ROUNDING:
+            continue
+        if not placed:
+            place_pieces(shapes, z, room.poses, room.vertices, room.discs)
+            placed = True
+        distance = pair_apart(shapes, room.vertices, room.discs, i, inf)
+        room.pairs[i, 0], room.pairs[i, 1] = distance, way[1]
+        figures[BODY] = min(figures[BODY], distance)
+    if not figures[WALL] > 0.0:
+        end(figures, AT_WALL, figures[WALL])
+    if not figures[BODY] > 0.0:
+        end(figures, AT_BODY, figures[BODY])
 
     # Departures of position, velocity, axes and their rates from their nominal motions.
     if nominal.flow.size:
@@ -178,60 +217,20 @@ def watch(
 
     time = now - entered[1]
     if cell + 1 == cells.rows.shape[0] and left_by_all(cell, memory.channels):
-        away = _share_of_tolerance(z, cells.places, cells.rooms, team.first)
+        # How far object and joints are off the goal over what is tolerated, whatever was measured [-].
+        away = 0.0
+        for k in range(robots):
+            first, n = team.first[2, k], team.first[2, k + 1] - team.first[2, k]
+            place, tolerances = cells.places[3 * k + first :], cells.rooms[0, 2 * k + first :]
+            away = max(away, hypot(z[0] - place[0], z[1] - place[1]) / tolerances[0])
+            away = max(away, abs(z[2] - place[2]) / tolerances[1])
+            for i in range(n):
+                away = max(away, abs(z[3 + first + i] - place[3 + i]) / tolerances[2 + i])
         end(figures, ARRIVED if away <= 1.0 else ASTRAY, away)
     elif time > cells.numbers[cell, 2]:
         end(figures, STALLED, time)
     elif now >= departures.times[1]:
         end(figures, LATE, time)
-
-
-@compiled(inlined=True, borrows=True)
-def _watch_distances(
-    cell: int, edges: FloatArray, team: TeamArrays, walls: FloatArray, reach: FloatArray, room: WatchRoom,
-    figures: FloatArray,
-) -> None:  # fmt: skip
-    """Measure the distance to the cell's boundary and clearances; the run ends where one is not positive."""
-    z, last, way, x, y = room.z, room.region, room.way, room.z[0], room.z[1]
-    if not (last[0] == cell and last[1] - hypot(x - last[2], y - last[3]) > figures[REGION] + ROUNDING):
-        inside = signed_distance(edges, x, y)
-        last[0], last[1], last[2], last[3] = cell, inside, x, y
-        figures[REGION] = min(figures[REGION], inside)
-        if not inside > 0.0:
-            end(figures, OUT_OF_REGION, inside)
-    between = 0.0
-    for i in range(1, reach.size):
-        between += reach[i] * abs(z[2 + i] - room.last_z[2 + i])
-    moved = hypot(x - room.last_z[0], y - room.last_z[1]) + reach[0] * abs(z[2] - room.last_z[2])
-    moved += between
-    if moved >= 0.0:  # Not NaN: there was a configuration before.
-        way[0] += moved
-        way[1] += 2.0 * between
-    for i in range(z.size):
-        room.last_z[i] = z[i]
-    placed = False
-    for i in range(len(team.pieces)):
-        if room.walls[i, 0] - (way[0] - room.walls[i, 1]) > figures[WALL] + ROUNDING:
-            continue
-        if not placed:
-            place_pieces(team, z, room.poses, room.vertices, room.discs)
-            placed = True
-        distance = piece_to_walls(team, room.vertices, room.discs, walls, i, inf)
-        room.walls[i, 0], room.walls[i, 1] = distance, way[0]
-        figures[WALL] = min(figures[WALL], distance)
-    for i in range(len(team.pairs)):
-        if room.pairs[i, 0] - (way[1] - room.pairs[i, 1]) > figures[BODY] + ROUNDING:
-            continue
-        if not placed:
-            place_pieces(team, z, room.poses, room.vertices, room.discs)
-            placed = True
-        distance = pair_apart(team, room.vertices, room.discs, i, inf)
-        room.pairs[i, 0], room.pairs[i, 1] = distance, way[1]
-        figures[BODY] = min(figures[BODY], distance)
-    if not figures[WALL] > 0.0:
-        end(figures, AT_WALL, figures[WALL])
-    if not figures[BODY] > 0.0:
-        end(figures, AT_BODY, figures[BODY])
 
 
 @compiled(borrows=True)
@@ -248,21 +247,3 @@ def left_by_all(cell: int, channels: FloatArray) -> bool:
         if channels[k, 0, 0] != cell or not channels[k, 0, 1] >= 0.0:
             return False
     return True
-
-
-@compiled(borrows=True)
-def _share_of_tolerance(z: FloatArray, places: FloatArray, rooms: FloatArray, first: IntArray) -> float:
-    """Return how far object and joints are off the goal over what is tolerated, whatever was measured [-].
-
-    The other arguments are fields of ``LoopCells`` and of ``LoopTeam``.
-    """
-    largest = 0.0
-    for k in range(first.shape[1] - 1):
-        own, row, n = 3 * k + first[2, k], 2 * k + first[2, k], first[2, k + 1] - first[2, k]
-        place, room = places[own:], rooms[0, row:]
-        largest = max(
-            largest, hypot(z[0] - place[0], z[1] - place[1]) / room[0], abs(z[2] - place[2]) / room[1]
-        )
-        for i in range(n):
-            largest = max(largest, abs(z[3 + first[2, k] + i] - place[3 + i]) / room[2 + i])
-    return largest

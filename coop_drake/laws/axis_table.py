@@ -8,7 +8,15 @@ import numpy as np
 
 from coop_drake.jit import compiled
 from coop_drake.laws.gains import TransitionGains
-from coop_drake.laws.ppc import Funnel, axis_bounds, damped, fading, ramped_gain, slowed_bounds, track_axis
+from coop_drake.laws.ppc import (
+    Funnel,
+    axis_bounds,
+    fading,
+    ramped_gain,
+    slowed_bounds,
+    speed_damping,
+    track_axis,
+)
 from coop_drake.tree.pose import FloatArray
 
 # Funnel and gains of every axis of one cell as a table of numbers, one row for each axis.
@@ -90,31 +98,18 @@ def bounds_of(row: FloatArray, time: float) -> tuple[float, float, float, float,
 
 
 @compiled(borrows=True)
-def track_row(row: FloatArray, time: float, position: float, rate: float) -> tuple[float, float]:
-    """Return ``track_axis`` of one axis from its row.
-
-    Args:
-        row: The axis, shape (``LAW_COLUMNS``,).
-        time: Time since the cell was entered [s].
-        position: x [rad or m].
-        rate: x' [rad/s or m/s].
-    """
-    return track_paced_row(row, time, 1.0, 0.0, position, rate)
-
-
-@compiled(borrows=True)
-def track_paced_row(
-    row: FloatArray, time: float, pace: float, pace_rate: float, position: float, rate: float
+def track_row(
+    row: FloatArray, time: float, position: float, rate: float, pace: float = 1.0, pace_rate: float = 0.0
 ) -> tuple[float, float]:
-    """Return ``track_axis`` of one axis whose funnel moves by a clock that may slow down.
+    """Return ``track_axis`` of one axis from its row, whose funnel moves by a clock that may slow down.
 
     Args:
         row: The axis, shape (``LAW_COLUMNS``,).
         time: tau, the clock's time since the cell was entered [s].
-        pace: tau' [-].
-        pace_rate: tau'' [1/s].
         position: x [rad or m].
         rate: x' [rad/s or m/s].
+        pace: tau' [-].
+        pace_rate: tau'' [1/s].
     """
     k1, k1_dot = ramped_gain(time, row[POSITION_GAIN], row[RAMP_RATE])
     gains = row[LOG_GAIN], k1, k1_dot * pace, row[RATE_GAIN], row[SATURATION]
@@ -183,7 +178,8 @@ def limited_row(row: FloatArray, acceleration: float, rate: float) -> float:
         rate: x' [rad/s or m/s].
     """
     most = row[ACCELERATION_LIMIT]
-    return damped(min(max(acceleration, -most), most), rate, row[RATE_LIMIT], row[LIMIT_GAIN])
+    asked: float = min(max(acceleration, -most), most)
+    return asked - speed_damping(asked * rate, rate * rate, row[RATE_LIMIT], row[LIMIT_GAIN]) * rate
 
 
 @compiled(borrows=True)
@@ -194,7 +190,7 @@ def _acceleration(
     x, v = object_state[2], object_state[5]
     if i > 0:
         x, v = robot[2 + i], robot[4 + table.shape[0] + i]
-    return track_paced_row(table[i], time - clock[0], clock[1], clock[2], x, v)[0]
+    return track_row(table[i], time - clock[0], x, v, clock[1], clock[2])[0]
 
 
 @compiled(borrows=True)

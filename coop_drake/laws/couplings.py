@@ -115,33 +115,18 @@ def _write_coefficients(
     """Write the sizes of all coefficients, by the accelerations at unit rates of one axis and of two."""
     axes = joints.shape[1] + 1
     n = axes + 2
-    state, efforts, own = np.zeros(2 * n), np.zeros(n), np.empty((axes, n))
-    both = np.empty(n)
+    state, efforts, own, found = np.zeros(2 * n), np.zeros(n), np.empty((axes, axes)), np.empty(n)
+    nothing, nowhere = np.empty(0, dtype=np.int64), np.empty((0, 3))
     for c in range(joints.shape[0]):
         state[3:n] = joints[c]
         for j in range(axes):
-            _accelerate(chain, state, j, j, efforts, work, own[j])
-            for k in range(j):
-                _accelerate(chain, state, j, k, efforts, work, both)
+            for k in range(j, -1, -1):  # Axis j alone comes first, then with every axis before it.
+                state[n:] = 0.0
+                state[n + 2 + j] = state[n + 2 + k] = 1.0
+                team_accelerations(chain, nothing, nowhere, nowhere, efforts, 0.0, state, work, found)
                 for i in range(axes):
-                    coefficients[c, i, j, k] = abs(both[2 + i] - own[j, 2 + i] - own[k, 2 + i])
-            for i in range(axes):
-                coefficients[c, i, j, j] = abs(own[j, 2 + i])
-
-
-@compiled
-def _accelerate(
-    chain: FloatArray,
-    state: FloatArray,
-    j: int,
-    k: int,
-    efforts: FloatArray,
-    work: TeamWork,
-    accelerations: FloatArray,
-) -> None:
-    """Write the accelerations at unit rates of axes j and k alone, without forces."""
-    n = accelerations.size
-    state[n:] = 0.0
-    state[n + 2 + j] = state[n + 2 + k] = 1.0
-    nothing, nowhere = np.empty(0, dtype=np.int64), np.empty((0, 3))
-    team_accelerations(chain, nothing, nowhere, nowhere, efforts, 0.0, state, work, accelerations)
+                    if k == j:
+                        own[j, i] = found[2 + i]
+                        coefficients[c, i, j, j] = abs(own[j, i])
+                    else:
+                        coefficients[c, i, j, k] = abs(found[2 + i] - own[j, i] - own[k, i])

@@ -338,19 +338,6 @@ def speed_damping(power: float, speed_squared: float, limit: float, gain: float)
 
 
 @compiled
-def damped(acceleration: float, rate: float, limit: float, gain: float) -> float:
-    """Return a - sigma x' of one axis [rad/s^2 or m/s^2].
-
-    Args:
-        acceleration: a [rad/s^2 or m/s^2].
-        rate: x' [rad/s or m/s].
-        limit: L; infinity for none [rad/s or m/s].
-        gain: g [1/s].
-    """
-    return acceleration - speed_damping(acceleration * rate, rate * rate, limit, gain) * rate
-
-
-@compiled
 def funnel_rate(decay_rate: float, shrink: float, quintic: bool) -> float:
     """Return the largest rate of a funnel's bound [rad/s or m/s].
 

@@ -148,7 +148,15 @@ def team_accelerations(
         at = int(tree[i, RATE])
         along = sx * forces[i, 0] + sy * forces[i, 1] + w * forces[i, 2]
         wanted[2 + i] = efforts[at - size] - tree[i, DAMPING] * state[at] - along
-        _write_row(tree, motion, inertias[i], i, matrix)
+        # The row of the mass matrix of the joint that leads to link i, left of its diagonal and on it.
+        m, mx, my, turning = inertias[i, 0], inertias[i, 1], inertias[i, 2], inertias[i, 3]
+        fx, fy, torque = m * sx - my * w, m * sy + mx * w, turning * w + mx * sy - my * sx
+        matrix[2 + i, 0], matrix[2 + i, 1], matrix[2 + i, 2] = fx, fy, torque
+        matrix[2 + i, 2 + i] = sx * fx + sy * fy + w * torque + tree[i, ROTOR]
+        while p > 0:
+            sx, sy, w = _direction(tree[p], motion[p])
+            matrix[2 + i, 2 + p] = sx * fx + sy * fy + w * torque
+            p = int(tree[p, PARENT])
     m, mx, my, turning = inertias[0, 0], inertias[0, 1], inertias[0, 2], inertias[0, 3]
     matrix[0, 0], matrix[1, 0], matrix[1, 1] = m, 0.0, m
     matrix[2, 0], matrix[2, 1], matrix[2, 2] = -my, mx, turning
@@ -166,21 +174,6 @@ def _direction(row: FloatArray, motion: FloatArray) -> tuple[float, float, float
     """Return what a unit rate of a joint adds to its link's velocity at the object's origin, and to w."""
     turn = row[TURN]
     return motion[UX] + turn * motion[PY], motion[UY] - turn * motion[PX], turn
-
-
-@compiled(borrows=True)
-def _write_row(tree: FloatArray, motion: FloatArray, inertia: FloatArray, i: int, matrix: FloatArray) -> None:
-    """Write the row of the mass matrix of the joint that leads to link i, left of its diagonal and on it."""
-    sx, sy, w = _direction(tree[i], motion[i])
-    m, mx, my, turning = inertia[0], inertia[1], inertia[2], inertia[3]
-    fx, fy, torque = m * sx - my * w, m * sy + mx * w, turning * w + mx * sy - my * sx
-    matrix[2 + i, 0], matrix[2 + i, 1], matrix[2 + i, 2] = fx, fy, torque
-    matrix[2 + i, 2 + i] = sx * fx + sy * fy + w * torque + tree[i, ROTOR]
-    j = int(tree[i, PARENT])
-    while j > 0:
-        sx, sy, w = _direction(tree[j], motion[j])
-        matrix[2 + i, 2 + j] = sx * fx + sy * fy + w * torque
-        j = int(tree[j, PARENT])
 
 
 @compiled(borrows=True)
@@ -391,7 +384,8 @@ def stick(
         accelerations: Receives those of the team, shape (3 + n,).
         wrenches: Wrenches on all bases, and where there is a further row, on the object; receives the sum.
     """
-    m, size, first = room.wanted.size, tree.shape[0] + 2, 3 * blocked.size
+    wanted, found, chosen = room.wanted, room.found, room.chosen
+    m, size, first = wanted.size, tree.shape[0] + 2, 3 * blocked.size
     for i in range(1, tree.shape[0]):
         rate = int(tree[i, RATE])
         efforts[rate - size] -= friction[1] * state[rate]
@@ -399,7 +393,7 @@ def stick(
     _motion_of(tree, bases, places, state, work, accelerations, room.joints, room.rates, room.free)
     for i in range(m):
         room.limits[i] = friction[0] if i >= first else np.inf if blocked[i // 3] == 1.0 else 0.0
-        room.wanted[i] = -room.rates[i] / (STICKING_TIME if i >= first else BRAKING_TIME) - room.free[i]
+        wanted[i] = -room.rates[i] / (STICKING_TIME if i >= first else BRAKING_TIME) - room.free[i]
     for j in range(m):
         if room.limits[j] == 0.0:
             continue
@@ -409,28 +403,8 @@ def stick(
         _motion_of(tree, bases, places, state, work, accelerations, room.joints, room.rates, room.pushed)
         for i in range(m):
             room.matrix[i, j] = room.pushed[i] - room.free[i]
-    _choose(room)
-    for j in range(m):
-        if room.limits[j] > 0.0:
-            _add(j, room.found[j], tree, wrenches, efforts, first)
-    team_accelerations(tree, bases, places, wrenches, efforts, gravity, state, work, accelerations)
 
-
-@compiled(borrows=True)
-def _add(
-    j: int, force: float, tree: FloatArray, wrenches: FloatArray, efforts: FloatArray, first: int
-) -> None:
-    """Add a force of one kind; that of the first joint has the number ``first``."""
-    if j < first:
-        wrenches[j // 3, j % 3] += force
-    else:
-        efforts[int(tree[1 + j - first, RATE]) - tree.shape[0] - 2] += force
-
-
-@compiled(borrows=True)
-def _choose(room: StickingRoom) -> None:
-    """Write the forces: which of them are at their limits, and what the others are."""
-    m, wanted, found, chosen = room.wanted.size, room.wanted, room.found, room.chosen
+    # The forces: which of them are at their limits, and what the others are.
     for i in range(m):
         chosen[i] = 0.0
     for _ in range(ATTEMPTS):
@@ -462,8 +436,22 @@ def _choose(room: StickingRoom) -> None:
                 break
         if not wrong:
             break
-    for i in range(m):
-        found[i] = min(max(found[i], -room.limits[i]), room.limits[i])
+    for j in range(m):
+        found[j] = min(max(found[j], -room.limits[j]), room.limits[j])
+        if room.limits[j] > 0.0:
+            _add(j, found[j], tree, wrenches, efforts, first)
+    team_accelerations(tree, bases, places, wrenches, efforts, gravity, state, work, accelerations)
+
+
+@compiled(borrows=True)
+def _add(
+    j: int, force: float, tree: FloatArray, wrenches: FloatArray, efforts: FloatArray, first: int
+) -> None:
+    """Add a force of one kind; that of the first joint has the number ``first``."""
+    if j < first:
+        wrenches[j // 3, j % 3] += force
+    else:
+        efforts[int(tree[1 + j - first, RATE]) - tree.shape[0] - 2] += force
 
 
 @compiled(borrows=True)

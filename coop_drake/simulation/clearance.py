@@ -17,7 +17,7 @@ from coop_drake.geometry.distances import meets_ring, ring_holds, squared_distan
 from coop_drake.geometry.polygons import edges_of, signed_distance
 from coop_drake.jit import compiled
 from coop_drake.tree.component_tree import ComponentTree
-from coop_drake.tree.pose import FloatArray, IntArray
+from coop_drake.tree.pose import FloatArray
 from coop_drake.tree.team_arrays import TeamArrays, moved, place_into
 
 
@@ -107,27 +107,23 @@ def pair_apart(team: TeamArrays, vertices: FloatArray, discs: FloatArray, k: int
     apart = hypot(discs[i, 0] - discs[j, 0], discs[i, 1] - discs[j, 1]) - discs[i, 2] - discs[j, 2]
     if apart >= bound:
         return apart
-    return _between(vertices, team.pieces[i], team.pieces[j]) - team.radii[i] - team.radii[j]
-
-
-@compiled(borrows=True)
-def _between(vertices: FloatArray, one: IntArray, other: IntArray) -> float:
-    """Signed distance [m] of two hulls, rows of ``TeamArrays.pieces``; minus the deepest vertex's depth."""
+    # The distance of the two hulls; where they overlap, minus the depth of the deepest vertex.
+    one, other, radii = team.pieces[i], team.pieces[j], (team.radii[i], team.radii[j])
     squared, depth, overlap = inf, 0.0, False
     before = other[2] - 1
-    for k in range(other[1], other[2]):
-        x, y, u, v = vertices[k, 0], vertices[k, 1], vertices[before, 0], vertices[before, 1]
-        before = k
+    for corner in range(other[1], other[2]):
+        x, y, u, v = vertices[corner, 0], vertices[corner, 1], vertices[before, 0], vertices[before, 1]
+        before = corner
         overlap = overlap or meets_ring(vertices, one[1], one[2], u, v, x, y)
         squared = squared_ring_distance(vertices, one[1], one[2], u, v, x, y, squared)
         if ring_holds(vertices, one[1], one[2], x, y):
             depth = max(depth, sqrt(squared_ring_distance(vertices, one[1], one[2], x, y, x, y, inf)))
-    for k in range(one[1], one[2]):
-        x, y = vertices[k, 0], vertices[k, 1]
+    for corner in range(one[1], one[2]):
+        x, y = vertices[corner, 0], vertices[corner, 1]
         if ring_holds(vertices, other[1], other[2], x, y):
             overlap = True
             depth = max(depth, sqrt(squared_ring_distance(vertices, other[1], other[2], x, y, x, y, inf)))
-    return -depth if overlap else sqrt(squared)
+    return (-depth if overlap else sqrt(squared)) - radii[0] - radii[1]
 
 
 @dataclass(frozen=True)

@@ -62,48 +62,14 @@ class Sample:
     arrived: bool
 
 
-@compiled
-def row_figures(
-    governors: FloatArray, accelerations: FloatArray, realised: FloatArray, energy_margins: FloatArray,
-    grasp_errors: FloatArray, clock_lags: FloatArray, causes: FloatArray,
-) -> tuple[float, float, float, float, float, float]:  # fmt: skip
-    """Return figures of one step for the log; one that rests on NaN is NaN.
-
-    Args:
-        governors: p_G as every robot keeps it, shape (N, 2) [m].
-        accelerations: Commanded accelerations of the object, shape (N, 3) [m/s^2, rad/s^2].
-        realised: Accelerations of z in the plant, shape (3 + n,).
-        energy_margins: Delta E of every robot, shape (N,) [m^2/s^2].
-        grasp_errors: Shape (N,) [m].
-        clock_lags: Lag of the funnels' clock [s], shape (1,), or (0,) where there is none.
-        causes: Why the team is held, see ``HoldSupervisor``; of shape (0,) where it never is.
-
-    Returns:
-        Largest differences of copies of p_G, and of commanded to realised acceleration; smallest Delta E;
-        largest error of a grasp; lag of the clock; 1 where the team is held, else 0.
-    """
-    spread = largest_difference(governors, governors[:1])
-    difference = largest_difference(accelerations, realised[:3].copy().reshape((1, 3)))
-    lag = clock_lags[0] if clock_lags.size else 0.0
-    return spread, difference, energy_margins.min(), grasp_errors.max(), lag, 1.0 * causes.any()
-
-
-@compiled(borrows=True)
 def largest_difference(rows: FloatArray, others: FloatArray) -> float:
     """Return the largest magnitude of a component of a difference, NaN if a component is NaN.
 
     Args:
         rows: Shape (N, k).
-        others: Rows to compare with, shape (N, k), or (1, k) to compare all with the same row.
+        others: Rows to compare with, shape (N, k), or (k,) to compare all with the same row.
     """
-    largest = 0.0
-    for i in range(rows.shape[0]):
-        for k in range(rows.shape[1]):
-            difference = abs(rows[i, k] - others[i % others.shape[0], k])
-            if np.isnan(difference):
-                return np.nan
-            largest = max(largest, difference)
-    return largest
+    return float(np.abs(rows - others).max())
 
 
 class Telemetry:
@@ -131,10 +97,6 @@ class Telemetry:
         at = {name: row[place] for name, place in self._places.items()}
         state = team.plant.GetPositionsAndVelocities(self._plant_context)[self._own]
         z, errors = state[: self._z], team.grasps.errors(self._plant_context)
-        spread, difference, margin, error, lag, held = row_figures(
-            *(at["governors"], at["wanted"], at["accelerations"], at["energy_margins"], errors),
-            *(at["clock_lag"], at["causes"]),
-        )
         cell, entry, arrived = at["instant"].tolist()
         return Sample(
             time=self._root.get_time(),
@@ -145,20 +107,20 @@ class Telemetry:
             accelerations=at["accelerations"],
             base_poses=at["base_poses"],
             governor_position=at["governors"][0],
-            governor_spread=spread,
+            governor_spread=largest_difference(at["governors"], at["governors"][0]),
             funnel_lower=at["funnel_lower"],
             funnel_upper=at["funnel_upper"],
-            energy_margin=margin,
+            energy_margin=float(at["energy_margins"].min()),
             object_wrench=total_wrench(at["commanded_wrenches"], *self._load, float(z[2])),
             commanded_wrenches=at["commanded_wrenches"],
             measured_wrenches=team.grasps.wrenches(self._plant_context),
-            grasp_error=error,
+            grasp_error=float(errors.max()),
             base_wrenches=at["base_wrenches"],
             joint_torques=at["joint_torques"],
-            acceleration_error=difference,
+            acceleration_error=largest_difference(at["wanted"], at["accelerations"][:3]),
             ready_margins=at["ready_margins"],
-            held=held,
-            clock_lag=lag,
+            held=float(at["causes"].any()),
+            clock_lag=float(at["clock_lag"].sum()),
             causes=at["causes"],
             alarms=at["alarms"],
             arrived=bool(arrived),
@@ -215,9 +177,9 @@ errors."""
 def margins(
     team: TeamArrays, walls: FloatArray, poses: FloatArray, vertices: FloatArray, discs: FloatArray,
     z: FloatArray, cell: FloatArray, lower: FloatArray, upper: FloatArray,
-    funnel_lower: FloatArray, funnel_upper: FloatArray, commanded: FloatArray, measured: FloatArray,
-) -> tuple[float, int, float, int, float, float, int, float, int, float]:  # fmt: skip
-    """Return what ``team_distances`` returns, then the margins of cell, funnels, slice and wrenches.
+    funnel_lower: FloatArray, funnel_upper: FloatArray,
+) -> tuple[float, int, float, int, float, float, int, float, int]:  # fmt: skip
+    """Return what ``team_distances`` returns, then the margins of cell, funnels and slice.
 
     Args:
         team: With the next five as in ``team_distances``.
@@ -231,19 +193,16 @@ def margins(
         upper: Of the cell's slice, shape (1 + n,) [rad or m].
         funnel_lower: Lower funnel bounds, shape (1 + n,) [rad or m].
         funnel_upper: Upper funnel bounds, shape (1 + n,) [rad or m].
-        commanded: Commanded wrenches of the end effectors, shape (N, 3) [N, N m].
-        measured: Wrenches that the grasps transmit, shape (N, 3) [N, N m].
 
     Returns:
         Distances; signed distance of the object to its cell's boundary [m]; smallest margin to a funnel and
-        the axis; smallest margin to the slice and the axis; largest difference of wrenches.
+        the axis; smallest margin to the slice and the axis.
     """
     wall, piece, between, pair = team_distances(team, walls, poses, vertices, discs, z)
     in_cell = signed_distance(cell, z[0], z[1])
     funnel, funnel_axis = _narrowest(z, funnel_lower, funnel_upper)
     margin, slice_axis = _narrowest(z, lower, upper)
-    error = largest_difference(measured, commanded)
-    return wall, piece, between, pair, in_cell, funnel, funnel_axis, margin, slice_axis, error
+    return wall, piece, between, pair, in_cell, funnel, funnel_axis, margin, slice_axis
 
 
 @compiled(borrows=True)
@@ -312,12 +271,10 @@ class Invariants:
 
     def check(self, sample: Sample) -> Margins:
         """Measure every margin, and say which invariant is broken if one is."""
-        arguments = (
-            *(sample.z, *self._cells[sample.cell], sample.funnel_lower, sample.funnel_upper),
-            *(sample.commanded_wrenches, sample.measured_wrenches),
-        )
+        arguments = sample.z, *self._cells[sample.cell], sample.funnel_lower, sample.funnel_upper
         measured = margins(*self._clearance.kernel_arguments, *arguments)
-        found = Margins(*measured, sample.energy_margin, sample.acceleration_error)
+        error = largest_difference(sample.measured_wrenches, sample.commanded_wrenches)
+        found = Margins(*measured, error, sample.energy_margin, sample.acceleration_error)
         broken = [*self._broken(sample, found), *(_inexact(found) if self._exact else ())]
         where = f"at t = {sample.time:.6g} s in cell {sample.cell}: "
         return found._replace(violation=where + "; ".join(broken)) if broken else found

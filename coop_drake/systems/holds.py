@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from pydrake.systems.framework import BasicVector, Context, DiscreteValues, EventStatus
 
-from coop_drake.laws.axis_table import ENERGY_BOUND, track_paced_row
+from coop_drake.laws.axis_table import ENERGY_BOUND, track_row
 from coop_drake.laws.ppc import SETTLING_TIME, lagging_clock
 from coop_drake.laws.readiness import ASKS
 from coop_drake.systems.block import ALARM_SIZE, CLOCK_SIZE, CURRENT_CELL_SIZE, REQUEST_SIZE, Block, index_of
@@ -85,7 +85,7 @@ class HoldMonitor(Block):
         state, robot, n = self._object.Eval(context), self._robot.Eval(context), len(self._tables[0]) - 1
         positions, rates = [state[2], *robot[3 : 3 + n]], [state[5], *robot[6 + n :]]
         return max(
-            track_paced_row(row, time, clock[1], clock[2], x, rate)[1] / row[ENERGY_BOUND]
+            track_row(row, time, x, rate, clock[1], clock[2])[1] / row[ENERGY_BOUND]
             for row, x, rate in zip(table, positions, rates, strict=True)
         )
 

@@ -126,12 +126,7 @@ def nominal_room(edges: FloatArray, stiffness: float, nominal: FloatArray, gover
         nominal: p^ and p^', shape (4,) or longer.
         governor: p_G, shape (2,) [m].
     """
-    return _room_at(signed_distance(edges, governor[0], governor[1]), stiffness, nominal, governor)
-
-
-@compiled(borrows=True)
-def _room_at(distance: float, stiffness: float, nominal: FloatArray, governor: FloatArray) -> float:
-    """Return ``nominal_room`` where the distance of p_G to the region's boundary is known."""
+    distance = signed_distance(edges, governor[0], governor[1])
     x, y = nominal[0] - governor[0], nominal[1] - governor[1]
     return distance - excursion(x, y, nominal[2], nominal[3], stiffness)
 
@@ -145,12 +140,7 @@ def nominal_margin(edges: FloatArray, stiffness: float, state: FloatArray) -> fl
         stiffness: K [1/s^2].
         state: p^, p^' and p_G, shape (6,).
     """
-    return _margin_at(signed_distance(edges, state[4], state[5]), stiffness, state)
-
-
-@compiled(borrows=True)
-def _margin_at(distance: float, stiffness: float, state: FloatArray) -> float:
-    """Return ``nominal_margin`` where the distance of p_G to the region's boundary is known."""
+    distance = signed_distance(edges, state[4], state[5])
     energy = tracking_energy(state[0] - state[4], state[1] - state[5], state[2], state[3], stiffness)
     return energy_margin(energy, distance, stiffness)
 
@@ -180,10 +170,11 @@ def step_nominal(
         following[2 + i] = flow[1, 0] * off + flow[1, 1] * rate
         following[4 + i] = governor
     stiffness, distance = row[STIFFNESS], signed_distance(edges, state[4], state[5])
-    room = _room_at(distance, stiffness, state, state[4:])
+    x, y, rate_x, rate_y = state[0] - state[4], state[1] - state[5], state[2], state[3]
+    room = distance - excursion(x, y, rate_x, rate_y, stiffness)  # as ``nominal_room``
     if room > 0.0:
         vx, vy = velocity_in_field(flat, field, state[4], state[5])
-        margin = _margin_at(distance, stiffness, state)
+        margin = energy_margin(tracking_energy(x, y, rate_x, rate_y, stiffness), distance, stiffness)
         vx, vy = governor_velocity(vx, vy, margin, stiffness, row[GOVERNOR_GAIN], row[SMOOTHING])
         dx, dy = limited_step(pace * vx, pace * vy, period, speed, room)
         following[4] += dx
