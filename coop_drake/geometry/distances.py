@@ -131,20 +131,17 @@ def separated(first: FloatArray, second: FloatArray, gap: float = 0.0) -> bool:
 
     With a negative gap polygons that overlap less deep than that count as separated, too.
     """
-    return _edge_separates(first, second, gap) or _edge_separates(second, first, gap)
-
-
-@compiled(borrows=True)
-def _edge_separates(first: FloatArray, second: FloatArray, gap: float) -> bool:
-    for i in range(len(first)):
-        k = i + 1 if i + 1 < len(first) else 0
-        x, y = first[k, 1] - first[i, 1], first[i, 0] - first[k, 0]
-        reach = x * first[i, 0] + y * first[i, 1] + gap * hypot(x, y)
-        apart = True
-        for j in range(len(second)):
-            if x * second[j, 0] + y * second[j, 1] <= reach:
-                apart = False
-                break
-        if apart:
-            return True
+    for _ in range(2):
+        for i in range(len(first)):
+            k = i + 1 if i + 1 < len(first) else 0
+            x, y = first[k, 1] - first[i, 1], first[i, 0] - first[k, 0]
+            reach = x * first[i, 0] + y * first[i, 1] + gap * hypot(x, y)
+            apart = True
+            for j in range(len(second)):
+                if x * second[j, 0] + y * second[j, 1] <= reach:
+                    apart = False
+                    break
+            if apart:
+                return True
+        first, second = second, first
     return False

@@ -189,10 +189,20 @@ def fitting_cycles(
     Returns:
         Vertices of the cycles, shape (V, 2) [m], and where each begins, shape (R + 1,); none of small rings.
     """
-    furthest = _furthest_out(points, first, convex)
+    # Beyond each edge this vertex of the footprint lies furthest out.
+    furthest = np.zeros(len(points), np.int64)
+    for r in range(len(first) - 1):
+        for i in range(first[r], first[r + 1]):
+            after = i + 1 if i + 1 < first[r + 1] else first[r]
+            x, y = points[after, 1] - points[i, 1], points[i, 0] - points[after, 0]
+            most = -np.inf
+            for k in range(len(convex)):
+                out = x * convex[k, 0] + y * convex[k, 1]
+                if out > most:
+                    most, furthest[i] = out, k
     starts = np.zeros(len(first), np.int64)
     drawn = np.empty((0, 2))
-    width, height = _width(convex, 0), _width(convex, 1)
+    width, height = np.ptp(convex[:, 0]), np.ptp(convex[:, 1])
     for writing in range(2):
         size = 0
         for r in range(len(first) - 1):
@@ -201,7 +211,11 @@ def fitting_cycles(
             for i in range(first[r], first[r] if small else first[r + 1]):
                 after = i + 1 if i + 1 < first[r + 1] else first[r]
                 k, last = furthest[before], furthest[i]
-                turn = _bends_in(points, before, i, after)
+                ax, ay = points[i, 0] - points[before, 0], points[i, 1] - points[before, 1]
+                bx, by = points[after, 0] - points[i, 0], points[after, 1] - points[i, 1]
+                cross, dot = ax * by - ay * bx, ax * bx + ay * by
+                # The corner points into the floor, or it is a needle, which blocks no more.
+                turn = cross <= 0.0 or (dot < 0.0 and cross <= -_NEEDLE * dot)
                 while True:
                     if writing == 1:
                         drawn[size, 0] = points[i, 0] - convex[k, 0]
@@ -215,42 +229,6 @@ def fitting_cycles(
         if writing == 0:
             drawn = np.empty((size, 2))
     return drawn, starts
-
-
-@compiled
-def _furthest_out(points: FloatArray, first: IntArray, convex: FloatArray) -> IntArray:
-    """Vertex of the footprint that lies furthest out beyond each edge, shape (E,)."""
-    furthest = np.zeros(len(points), np.int64)
-    for r in range(len(first) - 1):
-        for i in range(first[r], first[r + 1]):
-            after = i + 1 if i + 1 < first[r + 1] else first[r]
-            x, y = points[after, 1] - points[i, 1], points[i, 0] - points[after, 0]
-            most = -np.inf
-            for k in range(len(convex)):
-                out = x * convex[k, 0] + y * convex[k, 1]
-                if out > most:
-                    most, furthest[i] = out, k
-    return furthest
-
-
-@compiled(borrows=True)
-def _width(ring: FloatArray, axis: int) -> float:
-    """Width of a ring, shape (n, 2), along the first (0) or second (1) coordinate [m]."""
-    low, high = ring[0, axis], ring[0, axis]
-    for k in range(len(ring)):
-        low, high = min(low, ring[k, axis]), max(high, ring[k, axis])
-    width: float = high - low
-    return width
-
-
-@compiled(borrows=True)
-def _bends_in(points: FloatArray, before: int, here: int, after: int) -> bool:
-    """Whether a corner of the outline points into the floor, or is a needle, which blocks no more."""
-    ax, ay = points[here, 0] - points[before, 0], points[here, 1] - points[before, 1]
-    bx, by = points[after, 0] - points[here, 0], points[after, 1] - points[here, 1]
-    cross, dot = ax * by - ay * bx, ax * bx + ay * by
-    bends: bool = cross <= 0.0 or (dot < 0.0 and cross <= -_NEEDLE * dot)
-    return bends
 
 
 SAFE_SIDE = 1e-6

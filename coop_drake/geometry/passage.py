@@ -47,7 +47,17 @@ def cut_edges(
         stack = [(0.0, 1.0)]
         while len(stack) > 0:
             s, t = stack.pop()
-            gap = _gap(edges, k, x0 + 0.5 * (s + t) * dx, y0 + 0.5 * (s + t) * dy)
+            # Distance of the piece's middle to the nearest edge that does not touch its own.
+            x, y, squared = x0 + 0.5 * (s + t) * dx, y0 + 0.5 * (s + t) * dy, np.inf
+            for j in range(edges.shape[0]):
+                ax, ay, bx, by = edges[j, 0], edges[j, 1], edges[j, 2], edges[j, 3]
+                touches = False
+                for end in (0, 2):
+                    u, v = edges[k, end], edges[k, end + 1]
+                    touches = touches or (ax == u and ay == v) or (bx == u and by == v)
+                if not touches:
+                    squared = min(squared, squared_distance(x, y, ax, ay, bx, by))
+            gap = sqrt(squared)
             if (t - s) * length > max(shortest, min(coarsest, gap / per_gap)):
                 stack.append((0.5 * (s + t), t))
                 stack.append((s, 0.5 * (s + t)))
@@ -55,21 +65,6 @@ def cut_edges(
                 starts.append((x0 + s * dx, y0 + s * dy))
                 owners.append(k)
     return np.array(starts[1:]), np.array(owners[1:])
-
-
-@compiled(borrows=True)
-def _gap(edges: FloatArray, k: int, x: float, y: float) -> float:
-    """Distance of a point of edge k to the nearest edge that does not touch it [m]."""
-    gap = np.inf
-    for j in range(edges.shape[0]):
-        x0, y0, x1, y1 = edges[j, 0], edges[j, 1], edges[j, 2], edges[j, 3]
-        touches = False
-        for end in (0, 2):
-            u, v = edges[k, end], edges[k, end + 1]
-            touches = touches or (x0 == u and y0 == v) or (x1 == u and y1 == v)
-        if not touches:
-            gap = min(gap, squared_distance(x, y, x0, y0, x1, y1))
-    return sqrt(gap)
 
 
 # Triangles of a polygon between points of its rings, fine enough that diagonals cross passages squarely.

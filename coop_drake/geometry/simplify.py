@@ -69,15 +69,6 @@ def sharpest_angle(polygon: Polygon) -> float:
 
 
 @compiled(borrows=True)
-def _drop_depth(points: FloatArray, a: int, b: int, c: int, slack: float) -> float:
-    """Depth that leaving out b cuts off; infinite where b is reflex by more than the slack."""
-    ax, ay, bx, by = points[a, 0], points[a, 1], points[b, 0], points[b, 1]
-    cx, cy = points[c, 0], points[c, 1]
-    depth = sqrt(squared_distance(bx, by, ax, ay, cx, cy))
-    return depth if twice_area(ax, ay, bx, by, cx, cy) >= 0.0 or depth <= slack else inf
-
-
-@compiled(borrows=True)
 def _prolong(points: FloatArray, a: int, b: int, c: int, d: int) -> tuple[float, float, float]:
     """Where a b and d c, prolonged, meet beyond the reflex edge b c, and how far from it: (x, y, depth)."""
     ux, uy = points[b, 0] - points[a, 0], points[b, 1] - points[a, 1]
@@ -130,20 +121,6 @@ def _is_free(
     return True
 
 
-@compiled(borrows=True)
-def _best_step(
-    points: FloatArray, around: tuple[int, int, int, int], error: FloatArray, tolerance: float, slack: float
-) -> tuple[float, int]:
-    """Depth of the cheaper step at b, added to what its edges have lost already, and which step it is."""
-    a, b, c, d = around
-    drop = max(error[a], error[b]) + _drop_depth(points, a, b, c, slack)
-    _, _, depth = _prolong(points, a, b, c, d)
-    prolong = max(error[a], error[b] + depth, error[c])
-    if min(drop, prolong) > tolerance:
-        return inf, 0
-    return (drop, DROP) if drop <= prolong else (prolong, PROLONG)
-
-
 @compiled
 def _simplify(
     points: FloatArray, following: IndexArray, preceding: IndexArray, tolerance: float, slack: float
@@ -159,8 +136,19 @@ def _simplify(
             if not alive[b]:
                 continue
             if stale[b]:
-                around = (preceding[b], b, following[b], following[following[b]])
-                cost[b], step[b] = _best_step(points, around, error, tolerance, slack)
+                # The depth of the cheaper step, added to what its edges have lost already. A vertex that is
+                # reflex by more than the slack is never left out.
+                a, c = preceding[b], following[b]
+                ax, ay, bx, by = points[a, 0], points[a, 1], points[b, 0], points[b, 1]
+                cx, cy = points[c, 0], points[c, 1]
+                depth = sqrt(squared_distance(bx, by, ax, ay, cx, cy))
+                kept = twice_area(ax, ay, bx, by, cx, cy) < 0.0 and depth > slack
+                drop = max(error[a], error[b]) + (inf if kept else depth)
+                _, _, depth = _prolong(points, a, b, c, following[c])
+                prolong = max(error[a], error[b] + depth, error[c])
+                cost[b], step[b] = (drop, DROP) if drop <= prolong else (prolong, PROLONG)
+                if min(drop, prolong) > tolerance:
+                    cost[b], step[b] = inf, 0
                 stale[b] = False
             if cost[b] < inf and (best < 0 or cost[b] < cost[best]):
                 best = b

@@ -67,17 +67,6 @@ def disc_turn(half_width: float) -> float:
     return min(0.6, max(0.05, 0.9 * sqrt(half_width))) if half_width > 0.0 else 0.6
 
 
-@compiled(borrows=True)
-def sort(values: FloatArray) -> None:
-    """Sort a short array in place by insertion; numpy's sort takes longer to compile, and as long to run."""
-    for i in range(1, len(values)):
-        value, k = values[i], i
-        while k > 0 and values[k - 1] > value:
-            values[k] = values[k - 1]
-            k -= 1
-        values[k] = value
-
-
 @compiled
 def closed_directions(angles: FloatArray, largest_turn: float) -> FloatArray:
     """Sort directions, drop repeated ones and fill gaps so that no two neighbours are further apart.
@@ -91,8 +80,12 @@ def closed_directions(angles: FloatArray, largest_turn: float) -> FloatArray:
     """
     ordered = np.zeros(max(len(angles), 1))
     for i in range(len(angles)):
-        ordered[i] = angles[i] - _TURN * floor(angles[i] / _TURN)
-    sort(ordered)
+        # Few numbers are sorted as quickly by insertion as by numpy, whose sort takes longer to compile.
+        angle, k = angles[i] - _TURN * floor(angles[i] / _TURN), i
+        while k > 0 and ordered[k - 1] > angle:
+            ordered[k] = ordered[k - 1]
+            k -= 1
+        ordered[k] = angle
     kept = np.empty(len(ordered))
     count = 0
     for i in range(len(ordered)):
@@ -173,16 +166,6 @@ def edge_directions(vertices: FloatArray) -> FloatArray:
     return angles
 
 
-@compiled(borrows=True)
-def _furthest(vertices: FloatArray, i: int) -> bool:
-    """Whether vertex i of a ring is no nearer to the origin than the points next to it on its two edges."""
-    after = i + 1 if i + 1 < len(vertices) else 0
-    x, y = vertices[i, 0], vertices[i, 1]
-    ax, ay, bx, by = vertices[i - 1, 0], vertices[i - 1, 1], vertices[after, 0], vertices[after, 1]
-    outermost: bool = (bx - x) * x + (by - y) * y <= 0.0 and (ax - x) * x + (ay - y) * y <= 0.0
-    return outermost
-
-
 @compiled
 def over_revolute(vertices: FloatArray, centre: float, half_width: float) -> FloatArray:
     """Enclose a convex set turned about the origin by every angle of an interval.
@@ -208,9 +191,14 @@ def over_revolute(vertices: FloatArray, centre: float, half_width: float) -> Flo
         angles[size], angles[size + 1] = edges[i] - half_width, edges[i] + half_width
         size += 2
     for i in range(count):
-        radii[i] = hypot(vertices[i, 0], vertices[i, 1])
-        if radii[i] > 0.0 and _furthest(vertices, i):
-            bearing = atan2(vertices[i, 1], vertices[i, 0])
+        x, y = vertices[i, 0], vertices[i, 1]
+        radii[i] = hypot(x, y)
+        # The points next to the vertex on its two edges are no further from the origin.
+        after = i + 1 if i + 1 < count else 0
+        ax, ay, bx, by = vertices[i - 1, 0], vertices[i - 1, 1], vertices[after, 0], vertices[after, 1]
+        outermost = (bx - x) * x + (by - y) * y <= 0.0 and (ax - x) * x + (ay - y) * y <= 0.0
+        if radii[i] > 0.0 and outermost:
+            bearing = atan2(y, x)
             for part in range(parts + 1):
                 angles[size] = bearing + half_width * (2.0 * part / parts - 1.0)
                 size += 1
@@ -339,7 +327,6 @@ def half_planes_polygon(angles: FloatArray, offsets: FloatArray) -> FloatArray:
     return vertices[: size if size >= 3 else 0]
 
 
-@compiled
 def shrunk(vertices: FloatArray, distance: float) -> FloatArray:
     """Find points that keep a distance from the boundary of a convex polygon.
 
@@ -469,14 +456,6 @@ def over_joint(
     return ring
 
 
-@compiled(borrows=True)
-def joint_width(team: TeamArrays, link: int, lower: FloatArray, upper: FloatArray) -> float:
-    """Width of the interval of the joint that moves a component [rad or m]; others as in ``over_joint``."""
-    axis = team.links[link, 1] - 2
-    width: float = upper[axis] - lower[axis]
-    return width
-
-
 @compiled
 def over_piece(
     team: TeamArrays, piece: int, lower: FloatArray, upper: FloatArray, stages: int, rounded: bool
@@ -499,7 +478,8 @@ def over_piece(
     widest = 0.0
     link = team.pieces[piece, 0]
     while link >= 0 and stages > 0:
-        widest = max(widest, joint_width(team, link, lower, upper))
+        axis = team.links[link, 1] - 2
+        widest = max(widest, upper[axis] - lower[axis])
         ring = over_joint(team, link, ring, lower, upper)
         link, stages = team.links[link, 0], stages - 1
     return rounded_sweep(team, piece, ring, widest) if rounded else ring

@@ -15,8 +15,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from coop_drake.geometry.distances import nearest_fraction, ray_crosses
-from coop_drake.harmonic_maps.panels import gauss_nodes, point_distance
+from coop_drake.geometry.distances import nearest_fraction, ray_crosses, squared_distance
+from coop_drake.harmonic_maps.panels import gauss_nodes
 from coop_drake.jit import compiled
 from coop_drake.tree.pose import FloatArray, IntArray
 
@@ -239,8 +239,21 @@ def _panel_sums(
     plus, minus = px * px + py * py, mx * mx + my * my
     zx, zy = 0.5 * (px + mx), 0.5 * (py + my)
     step = 0.0
+    # Imaginary parts of the integrals for u and v; real and imaginary parts of their derivatives.
+    tu, tv, ru, iu, rv, iv = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     if np.sqrt(plus) + np.sqrt(minus) > _QUADRATURE:
-        tu, tv, ru, iu, rv, iv = _gauss(m, density, zx, zy)
+        for j in range(REFINED_NODES):
+            to_x = _GAUSS_X[j] - zx
+            inverse = 1.0 / (to_x * to_x + zy * zy)
+            re, im = to_x * inverse, zy * inverse
+            u, v = _GAUSS_W[j] * m[density + 2 * j], _GAUSS_W[j] * m[density + 2 * j + 1]
+            re2, im2 = re * re - im * im, 2.0 * re * im
+            tu += u * im
+            tv += v * im
+            ru += u * re2
+            iu += u * im2
+            rv += v * re2
+            iv += v * im2
     else:
         start = np.arctan2(py, px) if plus > 0.0 else 0.0
         end = np.arctan2(my, mx) if minus > 0.0 else 0.0  # on a shared end, exactly one of two panels sees it
@@ -251,7 +264,20 @@ def _panel_sums(
             end = end if end > -0.5 * pi else end + 2.0 * pi
         q0 = complex(0.25 * np.log(max(plus, 1e-60) / max(minus, 1e-60)), 0.5 * (start - end))
         d0 = -1.0 / (complex(px, py) * complex(mx, my) + (1e-60 if plus * minus == 0.0 else 0.0))
-        tu, tv, ru, iu, rv, iv = _legendre(m, density + 2 * REFINED_NODES, complex(zx, zy), q0, d0)
+        # (k + 1) Q_{k+1} = (2 k + 1) zeta Q_k - k Q_{k-1}, and Q'_{k+1} = Q'_{k-1} + (2 k + 1) Q_k.
+        zeta, coefficients = complex(zx, zy), density + 2 * REFINED_NODES
+        q1, d1 = zeta * q0 - 1.0, q0 + zeta * d0
+        u, v = m[coefficients], m[coefficients + 1]
+        tu, tv, du, dv = u * q0.imag, v * q0.imag, u * d0, v * d0
+        for k in range(1, REFINED_NODES):
+            u, v = m[coefficients + 2 * k], m[coefficients + 2 * k + 1]
+            tu += u * q1.imag
+            tv += v * q1.imag
+            du += u * d1
+            dv += v * d1
+            q0, q1, d0, d1 = q1, ((2 * k + 1) * zeta * q1 - k * q0) / (k + 1), d1, d0 + (2 * k + 1) * q1
+        tu, tv = -2.0 * tu, -2.0 * tv
+        ru, iu, rv, iv = -2.0 * du.real, -2.0 * du.imag, -2.0 * dv.real, -2.0 * dv.imag
         if min(plus, minus) < _JUNCTION * _JUNCTION:
             step = 2.0 * _JUNCTION
     # The derivatives with respect to zeta, divided by h, are those with respect to x + i y.
@@ -262,54 +288,29 @@ def _panel_sums(
     )  # fmt: skip
 
 
-@compiled(borrows=True)
-def _gauss(m: FlatMap, values: int, zx: float, zy: float) -> tuple[float, float, float, float, float, float]:
-    """Imaginary parts of the two integrals, real and imaginary parts of their derivatives, by quadrature."""
-    tu, tv, ru, iu, rv, iv = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    for j in range(REFINED_NODES):
-        rx = _GAUSS_X[j] - zx
-        inverse = 1.0 / (rx * rx + zy * zy)
-        re, im = rx * inverse, zy * inverse
-        u, v = _GAUSS_W[j] * m[values + 2 * j], _GAUSS_W[j] * m[values + 2 * j + 1]
-        re2, im2 = re * re - im * im, 2.0 * re * im
-        tu += u * im
-        tv += v * im
-        ru += u * re2
-        iu += u * im2
-        rv += v * re2
-        iv += v * im2
-    return tu, tv, ru, iu, rv, iv
+@compiled
+def _corner_sums(m: FlatMap, k: int, level: int, x: float, y: float, rounding: float) -> tuple[Sums, bool]:
+    """Field of one corner from a level down, at a point not far from it; at the vertex, just inside of it.
 
-
-@compiled(borrows=True)
-def _legendre(
-    m: FlatMap, coefficients: int, zeta: complex, q0: complex, d0: complex
-) -> tuple[float, float, float, float, float, float]:
-    """The same as `_gauss` through Q_k and its derivative, from their values q0 and d0 for k = 0.
-
-    The recurrence is (k + 1) Q_{k+1} = (2 k + 1) zeta Q_k - k Q_{k-1}, and Q'_{k+1} = Q'_{k-1} + (2 k + 1)
-    Q_k.
+    And whether the point counts as the vertex.
     """
-    q1, d1 = zeta * q0 - 1.0, q0 + zeta * d0
-    u, v = m[coefficients], m[coefficients + 1]
-    tu, tv, du, dv = u * q0.imag, v * q0.imag, u * d0, v * d0
-    for k in range(1, REFINED_NODES):
-        u, v = m[coefficients + 2 * k], m[coefficients + 2 * k + 1]
-        tu += u * q1.imag
-        tv += v * q1.imag
-        du += u * d1
-        dv += v * d1
-        q0, q1, d0, d1 = q1, ((2 * k + 1) * zeta * q1 - k * q0) / (k + 1), d1, d0 + (2 * k + 1) * q1
-    return -2.0 * tu, -2.0 * tv, -2.0 * du.real, -2.0 * du.imag, -2.0 * dv.real, -2.0 * dv.imag
-
-
-@compiled(borrows=True)
-def _tail(m: FlatMap, k: int, level: int, rx: float, ry: float) -> Sums:
-    """The legs of corner k from a level down, seen from afar, through their compressed density."""
+    corner = row(m, CORNERS, k, 15)
+    rx, ry = x - m[corner], y - m[corner + 1]
+    radius = max(2.0 * m[corner + 8] * 0.5**LEVELS, 4.0 * rounding)
+    at_vertex = rx * rx + ry * ry < radius * radius
+    if at_vertex:
+        rx, ry = radius * m[corner + 6], radius * m[corner + 7]
+    total = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    distance, scale = np.hypot(rx, ry), m[corner + 8] * 0.5**level
+    while level < LEVELS and distance < 2.0 * scale:
+        for place in range(2 * integer(m, CORNER_INDEX, k, 7, 1)):
+            total = _add(total, _panel_sums(m, k, place, level, x, y, rx, ry, rounding))
+        scale *= 0.5
+        level += 1
+    # From here the legs down from this level are seen from afar, through their compressed density.
     tu, tv, xu, yu, xv, yv = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     n, grid = integer(m, CORNER_INDEX, k, 7, 2), row(m, GRID, integer(m, CORNER_INDEX, k, 7, 3), 2)
     tail = row(m, TAILS, integer(m, CORNER_INDEX, k, 7, 6) + 2 * level * n, 2)
-    corner = row(m, CORNERS, k, 15)
     scale = m[corner + 8] * 0.5**level
     for leg in range(2):
         dx, dy = scale * m[corner + 2 + 2 * leg], scale * m[corner + 3 + 2 * leg]
@@ -328,39 +329,7 @@ def _tail(m: FlatMap, k: int, level: int, rx: float, ry: float) -> Sums:
             yu += u * re2
             xv += v * im2
             yv += v * re2
-    return tu, tv, xu, yu, xv, yv, 0.0, 0.0
-
-
-@compiled(borrows=True)
-def _vertex_radius(m: FlatMap, k: int, rounding: float) -> float:
-    """Distance from a vertex below which points count as the vertex [m]."""
-    return max(2.0 * float(m[row(m, CORNERS, k, 15) + 8]) * 0.5**LEVELS, 4.0 * rounding)
-
-
-@compiled(borrows=True)
-def _is_at_vertex(m: FlatMap, k: int, x: float, y: float, rounding: float) -> bool:
-    """Whether a point counts as the vertex of a corner."""
-    corner, radius = row(m, CORNERS, k, 15), _vertex_radius(m, k, rounding)
-    rx, ry = x - m[corner], y - m[corner + 1]
-    return bool(rx * rx + ry * ry < radius * radius)
-
-
-@compiled
-def _corner_sums(m: FlatMap, k: int, level: int, x: float, y: float, rounding: float) -> Sums:
-    """Field of one corner from a level down, at a point not far from it; at the vertex, just inside of it."""
-    corner = row(m, CORNERS, k, 15)
-    rx, ry = x - m[corner], y - m[corner + 1]
-    if _is_at_vertex(m, k, x, y, rounding):
-        radius = _vertex_radius(m, k, rounding)
-        rx, ry = radius * m[corner + 6], radius * m[corner + 7]
-    total = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-    distance, scale = np.hypot(rx, ry), m[corner + 8] * 0.5**level
-    while level < LEVELS and distance < 2.0 * scale:
-        for place in range(2 * integer(m, CORNER_INDEX, k, 7, 1)):
-            total = _add(total, _panel_sums(m, k, place, level, x, y, rx, ry, rounding))
-        scale *= 0.5
-        level += 1
-    return _add(total, _tail(m, k, level, rx, ry))
+    return _add(total, (tu, tv, xu, yu, xv, yv, 0.0, 0.0)), bool(at_vertex)
 
 
 @compiled(borrows=True)
@@ -377,11 +346,11 @@ def seen_from(m: FlatMap, k: int, place: int, level: int, x: float, y: float) ->
         ax, ay, bx, by = panel_ends(m, k, place, level, x, y, rx, ry)
         middle = 0.5 * np.sqrt((ax + bx) ** 2 + (ay + by) ** 2)
         half = 0.5 * np.sqrt((bx - ax) ** 2 + (by - ay) ** 2)
-        return point_distance(0.0, 0.0, ax, ay, bx, by), middle, half
+        return np.sqrt(squared_distance(0.0, 0.0, ax, ay, bx, by)), middle, half
     leg, nearest = m[corner + 8] * 0.5**level, np.inf
     for side in range(2):
         ax, ay = leg * m[corner + 2 + 2 * side] - rx, leg * m[corner + 3 + 2 * side] - ry
-        nearest = min(nearest, point_distance(0.0, 0.0, ax, ay, -rx, -ry))
+        nearest = min(nearest, np.sqrt(squared_distance(0.0, 0.0, ax, ay, -rx, -ry)))
     return nearest, np.sqrt(rx * rx + ry * ry), leg
 
 
@@ -391,14 +360,8 @@ def solved_nodes(m: FlatMap, k: int, place: int) -> tuple[int, int]:
     if k >= 0:
         return integer(m, CORNER_INDEX, k, 7, 0), integer(m, CORNER_INDEX, k + 1, 7, 0)
     regular = integer(m, CORNER_INDEX, rows_of(m, CORNERS), 7, 0)
-    count = (_row_length(m) - regular) // rows_of(m, PANELS)
+    count = (int(m[_HEAD + SOURCES * _ENTRY + 2]) - regular) // rows_of(m, PANELS)
     return regular + place * count, regular + (place + 1) * count
-
-
-@compiled(borrows=True)
-def _row_length(m: FlatMap) -> int:
-    """Number of solved nodes: the length of each of the six rows of sources."""
-    return (row(m, CORNERS, 0, 15) - row(m, SOURCES, 0, 0)) // 6
 
 
 @compiled(borrows=True)
@@ -414,7 +377,7 @@ def gather(
     """
     if (place < 0 and level == 0) or (k < 0 and (not opened or seen[1] - radius >= FAR * seen[2])):
         first, last = solved_nodes(m, k, place)
-        sources, n = row(m, SOURCES, 0, 0), _row_length(m)
+        sources, n = row(m, SOURCES, 0, 0), int(m[_HEAD + SOURCES * _ENTRY + 2])
         for j in range(first, last):
             for i in range(6):
                 nodes[i, j - first] = m[sources + i * n + j]
@@ -422,8 +385,18 @@ def gather(
             nodes[1, j - first] -= y
         return int(last - first)
     corner = row(m, CORNERS, max(k, 0), 15)
-    if place < 0:
-        return _gather_tail(m, k, level, m[corner] - x, m[corner + 1] - y, nodes)
+    if place < 0:  # The corner's compressed density at the level.
+        n, grid = integer(m, CORNER_INDEX, k, 7, 2), row(m, GRID, integer(m, CORNER_INDEX, k, 7, 3), 2)
+        tail = row(m, TAILS, integer(m, CORNER_INDEX, k, 7, 6) + 2 * level * n, 2)
+        scale = m[corner + 8] * 0.5**level
+        for i in range(2 * n):
+            leg, j = i // n, i % n
+            dx, dy = scale * m[corner + 2 + 2 * leg], scale * m[corner + 3 + 2 * leg]
+            s, w = m[grid + 2 * j], (2.0 * leg - 1.0) * m[grid + 2 * j + 1]
+            nodes[0, i], nodes[1, i] = m[corner] - x + s * dx, m[corner + 1] - y + s * dy
+            nodes[2, i], nodes[3, i] = w * dx, w * dy
+            nodes[4, i], nodes[5, i] = m[tail + 2 * i], m[tail + 2 * i + 1]
+        return 2 * n
     ax, ay, bx, by = panel_ends(m, k, place, level, x, y, x - m[corner], y - m[corner + 1])
     density = _density_of(m, k, place, level)
     hx, hy = 0.5 * (bx - ax), 0.5 * (by - ay)
@@ -432,22 +405,6 @@ def gather(
         nodes[2, j], nodes[3, j] = _GAUSS_W[j] * hx, _GAUSS_W[j] * hy
         nodes[4, j], nodes[5, j] = m[density + 2 * j], m[density + 2 * j + 1]
     return REFINED_NODES
-
-
-@compiled(borrows=True)
-def _gather_tail(m: FlatMap, k: int, level: int, x: float, y: float, nodes: FloatArray) -> int:
-    """Write the nodes of a corner's compressed density at a level, its vertex at (x, y); return how many."""
-    n, grid = integer(m, CORNER_INDEX, k, 7, 2), row(m, GRID, integer(m, CORNER_INDEX, k, 7, 3), 2)
-    tail, corner = row(m, TAILS, integer(m, CORNER_INDEX, k, 7, 6) + 2 * level * n, 2), row(m, CORNERS, k, 15)
-    scale = m[corner + 8] * 0.5**level
-    for i in range(2 * n):
-        leg, j = i // n, i % n
-        dx, dy = scale * m[corner + 2 + 2 * leg], scale * m[corner + 3 + 2 * leg]
-        s, w = m[grid + 2 * j], (2.0 * leg - 1.0) * m[grid + 2 * j + 1]
-        nodes[0, i], nodes[1, i] = x + s * dx, y + s * dy
-        nodes[2, i], nodes[3, i] = w * dx, w * dy
-        nodes[4, i], nodes[5, i] = m[tail + 2 * i], m[tail + 2 * i + 1]
-    return 2 * n
 
 
 @compiled(borrows=True)
@@ -493,8 +450,8 @@ def _all_sums(m: FlatMap, x: float, y: float) -> tuple[Sums, int]:
             integer(m, NEAR, item, 3, 2),
         )
         if place < 0:
-            part = _corner_sums(m, k, level, x, y, rounding)
-            vertex = k if _is_at_vertex(m, k, x, y, rounding) else vertex
+            part, at_vertex = _corner_sums(m, k, level, x, y, rounding)
+            vertex = k if at_vertex else vertex
         else:
             corner = row(m, CORNERS, max(k, 0), 15)
             part = _panel_sums(m, k, place, level, x, y, x - m[corner], y - m[corner + 1], rounding)

@@ -88,25 +88,20 @@ def lay_panels(outline: Outline, closeness: float) -> Panels:
     return Panels(legs, pieces[:, 0].astype(np.int64), pieces[:, 1], pieces[:, 2], pieces[:, 3])
 
 
-@compiled
-def point_distance(px: float, py: float, ax: float, ay: float, bx: float, by: float) -> float:
-    """Distance of a point from a segment from a to b [m]."""
-    return float(np.sqrt(squared_distance(px, py, ax, ay, bx, by)))
-
-
 @compiled(borrows=True)
 def segment_distance(p: FloatArray, q: FloatArray) -> float:
     """Distance of two segments (x0, y0, x1, y1) that do not cross [m]."""
-    return min(
+    squared = min(
         min(
-            point_distance(p[0], p[1], q[0], q[1], q[2], q[3]),
-            point_distance(p[2], p[3], q[0], q[1], q[2], q[3]),
+            squared_distance(p[0], p[1], q[0], q[1], q[2], q[3]),
+            squared_distance(p[2], p[3], q[0], q[1], q[2], q[3]),
         ),
         min(
-            point_distance(q[0], q[1], p[0], p[1], p[2], p[3]),
-            point_distance(q[2], q[3], p[0], p[1], p[2], p[3]),
+            squared_distance(q[0], q[1], p[0], p[1], p[2], p[3]),
+            squared_distance(q[2], q[3], p[0], p[1], p[2], p[3]),
         ),
     )
+    return float(np.sqrt(squared))
 
 
 @compiled
@@ -184,7 +179,8 @@ def _edge_panels(
                 if other != e:
                     gap = min(gap, segment_distance(piece, edges[other]))
                 x, y = edges[other, 0], edges[other, 1]
-                vertex = min(vertex, point_distance(x, y, piece[0], piece[1], piece[2], piece[3]))
+                squared = squared_distance(x, y, piece[0], piece[1], piece[2], piece[3])
+                vertex = min(vertex, np.sqrt(squared))
             short = b - a <= min(closeness * max(gap, vertex), longest[e])
             if short or depth > _DEEPEST or b - a < 1e-9 * length:
                 rows[count, 0], rows[count, 1], rows[count, 2], rows[count, 3] = e, a, b, gap

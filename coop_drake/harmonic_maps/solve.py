@@ -155,11 +155,9 @@ def _double_layer(grid: Nodes, segments: ComplexArray, panel_edge: IntArray, nod
 
     Segments are centre and half vector of each regular panel, shape (panels, 2).
     """
-    start, target = np.zeros(len(segments) + 1, dtype=np.int64), np.empty(0, dtype=np.int64)
-    pairs = grid.position, grid.edge, segments, panel_edge, start
-    target = np.empty(_find_near(*pairs, target), dtype=np.int64)
-    _find_near(*pairs, target)
-    weight = _near_weights(grid.position, segments, start, target, legendre_transform(nodes))
+    start, target, weight = _near_pairs(
+        grid.position, grid.edge, segments, panel_edge, legendre_transform(nodes)
+    )
     return _DoubleLayer(
         x=grid.position.real.copy(),
         y=grid.position.imag.copy(),
@@ -227,45 +225,45 @@ def _mark_near(
     return sources, targets
 
 
-@compiled(borrows=True)
-def _find_near(
-    target: ComplexArray, target_edge: IntArray, segments: ComplexArray, edge: IntArray,
-    start: IntArray, found: IntArray,
-) -> int:  # fmt: skip
-    """Find the targets near each regular panel but not on its edge; return how many there are.
-
-    Where each panel's begin is written, and as many of them as there is room for in ``found``.
-    """
-    end = 0
-    for k in range(len(segments)):
-        centre, half = segments[k, 0], segments[k, 1]
-        reach = (0.5 * CLOSE) ** 2 * (half.real**2 + half.imag**2)
-        for i in range(len(target)):
-            rx, ry = target[i].real - centre.real, target[i].imag - centre.imag
-            if rx * rx + ry * ry < reach and target_edge[i] != edge[k]:
-                zeta = (target[i] - centre) / half
-                if abs(zeta - 1.0) + abs(zeta + 1.0) < CLOSE:
-                    if end < len(found):
-                        found[end] = i
-                    end += 1
-        start[k + 1] = end
-    return end
-
-
 @compiled
-def _near_weights(
-    target: ComplexArray, segments: ComplexArray, start: IntArray, found: IntArray, transform: FloatArray
-) -> FloatArray:
-    """Exact weights of near panels for polynomial densities, shape (pairs, nodes)."""
+def _near_pairs(
+    target: ComplexArray, target_edge: IntArray, segments: ComplexArray, edge: IntArray, transform: FloatArray
+) -> tuple[IntArray, IntArray, FloatArray]:
+    """Find the targets near each regular panel but not on its edge, and the exact weights of the panel there.
+
+    The weights are those of polynomial densities; ``transform`` leads from values at the nodes to Legendre
+    coefficients.
+
+    Returns:
+        Where each panel's targets begin, and the end, shape (panels + 1,); the targets, shape (pairs,); and
+        the weights, shape (pairs, nodes).
+    """
     p = len(transform)
-    moments, weights = np.empty(p), np.zeros((len(found), p))
-    for k in range(len(segments)):
-        for t in range(start[k], start[k + 1]):
-            legendre_moments((target[found[t]] - segments[k, 0]) / segments[k, 1], moments)
-            for degree in range(p):
-                for j in range(p):
-                    weights[t, j] += moments[degree] * transform[degree, j]
-    return weights
+    start, found = np.zeros(len(segments) + 1, np.int64), np.empty(0, np.int64)
+    moments, weights = np.empty(p), np.empty((0, p))
+    for writing in range(2):
+        end = 0
+        for k in range(len(segments)):
+            centre, half = segments[k, 0], segments[k, 1]
+            reach = (0.5 * CLOSE) ** 2 * (half.real**2 + half.imag**2)
+            for i in range(len(target)):
+                rx, ry = target[i].real - centre.real, target[i].imag - centre.imag
+                if rx * rx + ry * ry >= reach or target_edge[i] == edge[k]:
+                    continue
+                zeta = (target[i] - centre) / half
+                if abs(zeta - 1.0) + abs(zeta + 1.0) >= CLOSE:
+                    continue
+                if writing == 1:
+                    found[end] = i
+                    legendre_moments(zeta, moments)
+                    for degree in range(p):
+                        for j in range(p):
+                            weights[end, j] += moments[degree] * transform[degree, j]
+                end += 1
+            start[k + 1] = end
+        if writing == 0:
+            found, weights = np.empty(end, np.int64), np.zeros((end, p))
+    return start, found, weights
 
 
 @compiled(borrows=True)

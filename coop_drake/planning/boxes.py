@@ -10,7 +10,7 @@ import numpy as np
 from shapely import MultiPolygon, Polygon
 
 from coop_drake.geometry.distances import separated
-from coop_drake.geometry.sweeps import joint_width, over_joint, rounded_sweep
+from coop_drake.geometry.sweeps import over_joint, rounded_sweep
 from coop_drake.geometry.swept_tree import TOUCH, BodyPairs, SweptTree
 from coop_drake.jit import compiled
 from coop_drake.planning.cells.cells import FreeBox
@@ -78,12 +78,6 @@ class PairSweeps(NamedTuple):
 
 
 @compiled
-def room_for_sweeps(count: int) -> PairSweeps:
-    """Memory for some sweeps."""
-    return PairSweeps(np.zeros(count + 1, np.int64), np.zeros(count))
-
-
-@compiled
 def swept_piece(
     boxes: BoxArrays,
     piece: int,
@@ -122,7 +116,8 @@ def swept_piece(
             row += 1
         if link < 0:
             return rounded_sweep(team, piece, ring, widest), vertices, row
-        widest = max(widest, joint_width(team, link, lower, upper))
+        axis = team.links[link, 1] - 2
+        widest = max(widest, upper[axis] - lower[axis])
         ring = over_joint(team, link, ring, lower, upper)
         link, stages = team.links[link, 0], stages + 1
 
@@ -204,7 +199,8 @@ def box_clearance(
     vertices, first = np.empty((32 * count, 2)), np.zeros(count + 1, np.int64)
     discs = np.empty((count, 3))
     needed, row = len(boxes.pair_sweeps), 0
-    sweeps, swept = room_for_sweeps(needed), np.empty((16 * needed, 2))
+    sweeps = PairSweeps(np.zeros(needed + 1, np.int64), np.zeros(needed))
+    swept = np.empty((16 * needed, 2))
     for k in range(count):
         ring, swept, row = swept_piece(boxes, count - 1 - k, lower, upper, sweeps, swept, row)
         enclosing_disc(ring, discs[k])
@@ -276,7 +272,8 @@ def clearances_in_box(
         result[k] = most
     disc = np.empty(3)
     needed, row = len(boxes.pair_sweeps), 0
-    sweeps, swept = room_for_sweeps(needed), np.empty((16 * needed, 2))
+    sweeps = PairSweeps(np.zeros(needed + 1, np.int64), np.zeros(needed))
+    swept = np.empty((16 * needed, 2))
     for piece in range(len(boxes.team.radii) - 1, -1, -1):
         ring, swept, row = swept_piece(boxes, piece, lower, upper, sweeps, swept, row)
         enclosing_disc(ring, disc)

@@ -97,35 +97,6 @@ vanishes."""
 
 
 @compiled(borrows=True)
-def _steer(path: FloatArray, x: float, y: float, ahead: float, radius: float) -> tuple[float, float]:
-    """Return a field along a path, of ``FIELD_SPEED``, slower within ``radius`` of its end as in (13)."""
-    nearest, segment, fraction = np.inf, 0, 0.0
-    for k in range(path.shape[0] - 1):
-        dx, dy = path[k + 1, 0] - path[k, 0], path[k + 1, 1] - path[k, 1]
-        s = nearest_fraction(x, y, path[k, 0], path[k, 1], path[k + 1, 0], path[k + 1, 1])
-        away = hypot(x - path[k, 0] - s * dx, y - path[k, 1] - s * dy)
-        if away <= nearest:
-            nearest, segment, fraction = away, k, s
-    k = segment
-    left = ahead + fraction * hypot(path[k + 1, 0] - path[k, 0], path[k + 1, 1] - path[k, 1])
-    aim_x, aim_y = path[-1, 0], path[-1, 1]
-    while k < path.shape[0] - 1:
-        length = hypot(path[k + 1, 0] - path[k, 0], path[k + 1, 1] - path[k, 1])
-        if left <= length and length > 0.0:
-            aim_x = path[k, 0] + left / length * (path[k + 1, 0] - path[k, 0])
-            aim_y = path[k, 1] + left / length * (path[k + 1, 1] - path[k, 1])
-            break
-        left -= length
-        k += 1
-    ux, uy = aim_x - x, aim_y - y
-    norm = hypot(ux, uy)
-    if norm == 0.0:
-        return 0.0, 0.0
-    speed = FIELD_SPEED * min(1.0, hypot(path[-1, 0] - x, path[-1, 1] - y) / radius)
-    return speed * ux / norm, speed * uy / norm
-
-
-@compiled(borrows=True)
 def _margin(state: FloatArray, edges: FloatArray, stiffness: float) -> tuple[float, float]:
     """Return Delta E of (15) in a cell, and the clearance of p_G [m]."""
     clearance = signed_distance(edges, state[4], state[5])
@@ -159,7 +130,33 @@ def _rates(
     driving = driving_margin(margin, clearance, steady, stiffness)
     if driving > 0.0:
         ahead = max(LOOKAHEAD * clearance, SHORTEST_LOOKAHEAD)
-        vx, vy = _steer(path, state[4], state[5], ahead, slowdown_radius(FIELD_SPEED, gain))
+        # The field leads along the path, from the point nearest to p_G to one ahead of it; it has the speed
+        # ``FIELD_SPEED``, and less near the path's end, as in (13).
+        x, y = state[4], state[5]
+        nearest, k, fraction = np.inf, 0, 0.0
+        for segment in range(path.shape[0] - 1):
+            ax, ay, bx, by = path[segment, 0], path[segment, 1], path[segment + 1, 0], path[segment + 1, 1]
+            s = nearest_fraction(x, y, ax, ay, bx, by)
+            away = hypot(x - ax - s * (bx - ax), y - ay - s * (by - ay))
+            if away <= nearest:
+                nearest, k, fraction = away, segment, s
+        left = ahead + fraction * hypot(path[k + 1, 0] - path[k, 0], path[k + 1, 1] - path[k, 1])
+        aim_x, aim_y = path[-1, 0], path[-1, 1]
+        while k < path.shape[0] - 1:
+            length = hypot(path[k + 1, 0] - path[k, 0], path[k + 1, 1] - path[k, 1])
+            if left <= length and length > 0.0:
+                aim_x = path[k, 0] + left / length * (path[k + 1, 0] - path[k, 0])
+                aim_y = path[k, 1] + left / length * (path[k + 1, 1] - path[k, 1])
+                break
+            left -= length
+            k += 1
+        vx, vy = 0.0, 0.0
+        ux, uy = aim_x - x, aim_y - y
+        norm = hypot(ux, uy)
+        if norm > 0.0:
+            radius = slowdown_radius(FIELD_SPEED, gain)
+            speed = FIELD_SPEED * min(1.0, hypot(path[-1, 0] - x, path[-1, 1] - y) / radius)
+            vx, vy = speed * ux / norm, speed * uy / norm
         result[4], result[5] = governor_velocity(vx, vy, driving, stiffness, gain, row[SMOOTHING])
     m = table.shape[0]
     left = fading(time, table[0, FADING_TIME])

@@ -18,7 +18,7 @@ from coop_drake.geometry.polygons import polygon_rings
 from coop_drake.geometry.sweeps import following, over_piece
 from coop_drake.geometry.swept_tree import BodyPairs, SweptTree
 from coop_drake.laws import ScheduledGains
-from coop_drake.planning.boxes import box_arrays, box_clearance, room_for_sweeps, sweeps_apart, swept_piece
+from coop_drake.planning.boxes import PairSweeps, box_arrays, box_clearance, sweeps_apart, swept_piece
 from coop_drake.planning.cells.cells import CellMaker
 from coop_drake.planning.channel import Channel, Regions, middle_of
 from coop_drake.planning.planner import plan
@@ -314,7 +314,9 @@ def test_sweeps_are_those_of_each_piece_and_bodies_touch_where_pairs_do(data: st
     pairs = BodyPairs(swept)
     boxes, bounds = box_arrays(swept, pairs), np.array(intervals)
     lower, upper = bounds[:, 0].copy(), bounds[:, 1].copy()
-    sweeps, vertices, row = room_for_sweeps(len(boxes.pair_sweeps)), np.empty((1, 2)), 0
+    count = len(boxes.pair_sweeps)
+    sweeps = PairSweeps(np.zeros(count + 1, np.int64), np.zeros(count))
+    vertices, row = np.empty((1, 2)), 0
     for piece in reversed(range(len(swept.pieces))):
         ring, vertices, row = swept_piece(boxes, piece, lower, upper, sweeps, vertices, row)
         assert (ring == over_piece(boxes.team, piece, lower, upper, len(boxes.team.links), True)).all()

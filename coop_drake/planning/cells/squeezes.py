@@ -208,12 +208,6 @@ def convex_hull(points: FloatArray) -> FloatArray:
     return corners
 
 
-@compiled(borrows=True)
-def _nearer(x: float, y: float, wall: FloatArray, radius: float) -> bool:
-    near: bool = squared_distance(x, y, wall[0], wall[1], wall[2], wall[3]) < radius * radius
-    return near
-
-
 @compiled
 def furthest_clear(ring: FloatArray, ux: float, uy: float, wall: FloatArray, radius: float) -> float:
     """The largest u . x of points x of a convex ring that are no nearer to a wall than a radius [m].
@@ -225,7 +219,8 @@ def furthest_clear(ring: FloatArray, ux: float, uy: float, wall: FloatArray, rad
     furthest: float = (ux * ring[:, 0] + uy * ring[:, 1]).min() - _BEYOND
     for i in range(len(ring)):
         ax, ay, bx, by = ring[i - 1, 0], ring[i - 1, 1], ring[i, 0], ring[i, 1]
-        held, after = _nearer(ax, ay, wall, radius), _nearer(bx, by, wall, radius)
+        held = squared_distance(ax, ay, wall[0], wall[1], wall[2], wall[3]) < radius * radius
+        after = squared_distance(bx, by, wall[0], wall[1], wall[2], wall[3]) < radius * radius
         if not after:
             furthest = max(furthest, ux * bx + uy * by)
         if held != after:
@@ -233,7 +228,7 @@ def furthest_clear(ring: FloatArray, ux: float, uy: float, wall: FloatArray, rad
                 ax, ay, bx, by = bx, by, ax, ay
             for _ in range(_HALVINGS):
                 mx, my = 0.5 * (ax + bx), 0.5 * (ay + by)
-                if _nearer(mx, my, wall, radius):
+                if squared_distance(mx, my, wall[0], wall[1], wall[2], wall[3]) < radius * radius:
                     ax, ay = mx, my
                 else:
                     bx, by = mx, my

@@ -331,23 +331,19 @@ def _apart(team: TeamArrays, poses: FloatArray, a: int, b: int, gap: float) -> b
     return apart
 
 
-@compiled(borrows=True)
-def _far(team: TeamArrays, poses: FloatArray, a: int, b: int, gap: float) -> bool:
-    """Whether the discs about two pieces keep the gap already."""
-    A, B, discs = team.pieces[a, 0], team.pieces[b, 0], team.discs
+@compiled(inlined=True, borrows=True)
+def _pair_apart(team: TeamArrays, poses: FloatArray, k: int, gap: float) -> bool:
+    """Whether the two pieces of a pair keep the gap."""
+    a, b, discs = team.pairs[k, 0], team.pairs[k, 1], team.discs
+    A, B = team.pieces[a, 0], team.pieces[b, 0]
+    # In most pairs the discs about the pieces keep the gap already.
     ax, ay, bx, by = discs[a, 0], discs[a, 1], discs[b, 0], discs[b, 1]
     dx = poses[A, 0] + poses[A, 2] * ax - poses[A, 3] * ay - poses[B, 0] - poses[B, 2] * bx + poses[B, 3] * by
     dy = poses[A, 1] + poses[A, 3] * ax + poses[A, 2] * ay - poses[B, 1] - poses[B, 3] * bx - poses[B, 2] * by
     reach = discs[a, 2] + discs[b, 2] + gap
-    far: bool = dx * dx + dy * dy > reach * reach
-    return far
-
-
-@compiled(inlined=True, borrows=True)
-def _pair_apart(team: TeamArrays, poses: FloatArray, k: int, gap: float) -> bool:
-    """Whether the two pieces of a pair keep the gap."""
-    a, b = team.pairs[k, 0], team.pairs[k, 1]
-    return _far(team, poses, a, b, gap) or _apart(team, poses, a, b, gap) or _apart(team, poses, b, a, gap)
+    if dx * dx + dy * dy > reach * reach:
+        return True
+    return _apart(team, poses, a, b, gap) or _apart(team, poses, b, a, gap)
 
 
 @compiled(borrows=True)

@@ -209,32 +209,6 @@ class SampledRegion(NamedTuple):
     tries: int
 
 
-@compiled(borrows=True)
-def guide_row(region: SampledRegion, number: float, front: int) -> int:
-    """Row of the guide to sample around, for a random number in [0, 1) and the furthest row reached."""
-    count = len(region.guide)
-    if count <= region.long:
-        return min(count - 1, int(number * count))
-    if number < _EVERYWHERE:
-        return int(number / _EVERYWHERE * count)
-    first, last = max(0, front - _WINDOW), min(count, front + _WINDOW + 1)
-    return first + int((number - _EVERYWHERE) / (1.0 - _EVERYWHERE) * (last - first))
-
-
-@compiled(borrows=True)
-def furthest_row(region: SampledRegion, front: int, side: int, z: FloatArray) -> int:
-    """Furthest row of the guide that the tree of a side has reached, now that it has a node at z."""
-    guide = region.guide
-    step, row = 1 - 2 * side, front
-    for _ in range(2 * _WINDOW if len(guide) > region.long else 0):
-        row += step
-        if row < 0 or row >= len(guide):
-            break
-        if (z[0] - guide[row, 0]) ** 2 + (z[1] - guide[row, 1]) ** 2 < _AT_ROW * _AT_ROW:
-            front = row
-    return front
-
-
 @compiled(inlined=True, borrows=True)
 def _value(region: SampledRegion, u: FloatArray, at: int, k: int, number: float) -> float:
     """Value of an axis for a random number: around the guide, or anywhere on axes without spread.
@@ -365,7 +339,15 @@ def connect(
     room, poses, drawn = np.empty((3, len(lower))), np.empty((len(team.links), 5)), np.empty(len(lower))
     side, fronts = 0, np.array([0, len(region.guide) - 1])
     for row in range(len(uniforms)):
-        at = guide_row(region, uniforms[row, 1], fronts[side])
+        # The row of the guide to sample around: any, or mostly one near the furthest that the tree reached.
+        number, rows = uniforms[row, 1], len(region.guide)
+        if rows <= region.long:
+            at = min(rows - 1, int(number * rows))
+        elif number < _EVERYWHERE:
+            at = int(number / _EVERYWHERE * rows)
+        else:
+            first, last = max(0, fronts[side] - _WINDOW), min(rows, fronts[side] + _WINDOW + 1)
+            at = first + int((number - _EVERYWHERE) / (1.0 - _EVERYWHERE) * (last - first))
         draw(team, grid, region, uniforms[row], at, gap, drawn, poses)
         other = 1 - side
         before = counts[side]
@@ -374,7 +356,14 @@ def connect(
         )
         if counts[side] > before:
             z = trees[side].nodes[before]
-            fronts[side] = furthest_row(region, fronts[side], side, z)
+            reached = fronts[side]
+            for _ in range(2 * _WINDOW if rows > region.long else 0):
+                reached += 1 - 2 * side
+                if reached < 0 or reached >= rows:
+                    break
+                away = (z[0] - region.guide[reached, 0]) ** 2 + (z[1] - region.guide[reached, 1]) ** 2
+                if away < _AT_ROW * _AT_ROW:
+                    fronts[side] = reached
             counts[other], met = _grow(
                 team, grid, trees[other], counts[other], z, np.inf, gap, scale, step, room, poses
             )
