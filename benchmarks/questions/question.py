@@ -18,7 +18,7 @@ from coop_drake.answers import PlanningProblem
 from coop_drake.errors import CoopDrakeError, ScenarioError
 from coop_drake.files import write_atomically
 from coop_drake.jit import compiled
-from coop_drake.planning.sampling.collision import bodies_apart, grid_for_team, is_free
+from coop_drake.planning.sampling.collision import ALL, bodies_apart, grid_for_team, is_free
 from coop_drake.plant import planning_problem
 from coop_drake.scenario import Goal, ObjectPose, Scenario, Start, Workspace, dump_scenario, load_scenario
 from coop_drake.scenario.model import DirectiveEntry, RobotLimits
@@ -66,7 +66,7 @@ def _narrowest(
             z = np.minimum(np.maximum(best + spread * (z - 0.5 * (lower + upper)), lower), upper)
         poses = place(team, z)
         extent = _extent(team, poses)
-        if extent < least and bodies_apart(team, poses, 0.0):
+        if extent < least and bodies_apart(team, poses, 0.0, ALL):
             least, best = extent, z
     return least
 

@@ -7,7 +7,7 @@ from typing import cast
 
 import numpy as np
 import shapely
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from shapely import Point, Polygon
 from shapely.geometry.base import BaseGeometry
 from shapely.geometry.polygon import orient
@@ -80,27 +80,26 @@ def signed_distance(edges: FloatArray, x: float, y: float) -> float:
     return sqrt(nearest) if inside else -sqrt(nearest)
 
 
-@compiled(borrows=True)
-def _segment_clearance(edges: FloatArray, ax: float, ay: float, bx: float, by: float) -> float:
-    """Distance of the segment a-b from the nearest edge [m], zero where they cross."""
-    nearest = np.inf
-    for k in range(edges.shape[0]):
-        x0, y0, x1, y1 = edges[k, 0], edges[k, 1], edges[k, 2], edges[k, 3]
-        if segments_cross(ax, ay, bx, by, x0, y0, x1, y1):
-            return 0.0
-        nearest = min(nearest, squared_distance(ax, ay, x0, y0, x1, y1))
-        nearest = min(nearest, squared_distance(bx, by, x0, y0, x1, y1))
-        nearest = min(nearest, squared_distance(x0, y0, ax, ay, bx, by))
-        nearest = min(nearest, squared_distance(x1, y1, ax, ay, bx, by))
-    return sqrt(nearest)
-
-
 @compiled
 def _segment_clearances(edges: FloatArray, starts: FloatArray, ends: FloatArray) -> FloatArray:
-    """Distances of many segments, whose ends have the shape (n, 2) each, from the nearest edge, (n,) [m]."""
+    """Distances of many segments, whose ends have the shape (n, 2) each, from the nearest edge, (n,) [m].
+
+    Zero where they cross.
+    """
     result = np.empty(len(starts))
-    for k in range(len(starts)):
-        result[k] = _segment_clearance(edges, starts[k, 0], starts[k, 1], ends[k, 0], ends[k, 1])
+    for i in range(len(starts)):
+        ax, ay, bx, by = starts[i, 0], starts[i, 1], ends[i, 0], ends[i, 1]
+        nearest = np.inf
+        for k in range(edges.shape[0]):
+            x0, y0, x1, y1 = edges[k, 0], edges[k, 1], edges[k, 2], edges[k, 3]
+            if segments_cross(ax, ay, bx, by, x0, y0, x1, y1):
+                nearest = 0.0
+                break
+            nearest = min(nearest, squared_distance(ax, ay, x0, y0, x1, y1))
+            nearest = min(nearest, squared_distance(bx, by, x0, y0, x1, y1))
+            nearest = min(nearest, squared_distance(x0, y0, ax, ay, bx, by))
+            nearest = min(nearest, squared_distance(x1, y1, ax, ay, bx, by))
+        result[i] = sqrt(nearest)
     return result
 
 
@@ -111,26 +110,6 @@ def _signed_distances(edges: FloatArray, points: FloatArray) -> FloatArray:
     for k in range(points.shape[0]):
         result[k] = signed_distance(edges, points[k, 0], points[k, 1])
     return result
-
-
-@compiled
-def _shortened(edges: FloatArray, points: FloatArray) -> NDArray[np.intp]:
-    """Indices of the points that ``BoundaryDistance.shortened`` keeps."""
-    clearance = np.inf
-    for k in range(len(points) - 1):
-        a, b = points[k], points[k + 1]
-        clearance = min(clearance, _segment_clearance(edges, a[0], a[1], b[0], b[1]))
-    kept, here = [0], 0
-    while here < len(points) - 1:
-        there, a = here + 1, points[here]
-        while there + 1 < len(points):
-            b = points[there + 1]
-            if _segment_clearance(edges, a[0], a[1], b[0], b[1]) < clearance:
-                break
-            there += 1
-        kept.append(there)
-        here = there
-    return np.array(kept)
 
 
 class BoundaryDistance:
@@ -167,7 +146,18 @@ class BoundaryDistance:
         Args:
             points: The way, shape (n, 2) [m].
         """
-        shorter: FloatArray = points[_shortened(self.edges, np.ascontiguousarray(points))]
+        clearance = self.along(points[:-1], points[1:]).min(initial=np.inf)
+        kept, here = [0], 0
+        while here < len(points) - 1:
+            there = here + 1
+            while there + 1 < len(points):
+                ahead = points[there + 1 : there + 2]
+                if self.along(points[here : here + 1], ahead)[0] < clearance:
+                    break
+                there += 1
+            kept.append(there)
+            here = there
+        shorter: FloatArray = points[kept]
         return shorter
 
     def along(self, starts: FloatArray, ends: FloatArray) -> FloatArray:

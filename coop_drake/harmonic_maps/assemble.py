@@ -33,9 +33,9 @@ from coop_drake.harmonic_maps.evaluate import (
     SOURCES,
     FlatMap,
     MapArrays,
+    add_to_series,
     far_field,
     flatten,
-    gather,
     integer,
     is_inside,
     leaf_at,
@@ -398,8 +398,7 @@ def _sort_out(
                 seen = seen_from(m, k, place, level, x, y)
                 factor = _TAIL if place < 0 else (_REFINED if opened else FAR)
                 if seen[0] >= _REACH * radius and seen[1] - radius >= factor * seen[2]:
-                    count = gather(m, k, place, level, opened, seen, x, y, radius, nodes)
-                    _expand(nodes, count, radius, series, box)
+                    add_to_series(m, k, place, level, opened, seen, x, y, radius, nodes, series, box)
                 elif opened and place < 0 and seen[2] >= radius and level + 1 < LEVELS:
                     # The panels of the corner's ring, and the corner within, are candidates in its place.
                     panels = 2 * integer(m, CORNER_INDEX, k, 7, 1)
@@ -418,7 +417,20 @@ def _sort_out(
                     kept[end, 0], kept[end, 1], kept[end, 2] = k, place, level
                     end += 1
                     nearest = min(nearest, seen[0])
-        gain[box] = _gain(m, kept, first[box], end, x, y, radius)
+        # A division may remove sources that are shorter than the box, but not those of a vertex in it: it
+        # would find the same again.
+        own, closest = -1, 1.5 * radius
+        for item in range(first[box], end):
+            k = kept[item, 0]
+            if k >= 0:
+                corner = row(m, CORNERS, k, 15)
+                distance = np.sqrt((m[corner] - x) ** 2 + (m[corner + 1] - y) ** 2)
+                if distance < closest:
+                    own, closest = k, distance
+        for item in range(first[box], end):
+            k, place, level = kept[item, 0], kept[item, 1], kept[item, 2]
+            if (k != own or k < 0) and seen_from(m, k, place, level, x, y)[2] < radius:
+                gain[box] += 1 if place >= 0 else _CORNER
         if state[box] == ON_BOUNDARY and nearest > radius:
             walls = rows_of(m, EDGES)
             state[box] = INSIDE if is_inside(m, row(m, EDGES, 0, 4), walls, x, y) else OUTSIDE
@@ -426,57 +438,6 @@ def _sort_out(
             end, gain[box] = first[box], 0
         first[box + 1] = end
     return first, kept[:end], gain
-
-
-@compiled(borrows=True)
-def _gain(m: FlatMap, near: IntArray, first: int, last: int, x: float, y: float, radius: float) -> int:
-    """How many of the sources near a box a division may remove: those that are shorter than the box.
-
-    What belongs to a vertex in the box does not count: divisions would find the same again.
-    """
-    own, nearest, gain = -1, 1.5 * radius, 0
-    for item in range(first, last):
-        k = near[item, 0]
-        if k >= 0:
-            corner = row(m, CORNERS, k, 15)
-            distance = np.sqrt((m[corner] - x) ** 2 + (m[corner + 1] - y) ** 2)
-            if distance < nearest:
-                own, nearest = k, distance
-    for item in range(first, last):
-        k, place = near[item, 0], near[item, 1]
-        if (k != own or k < 0) and seen_from(m, k, place, near[item, 2], x, y)[2] < radius:
-            gain += 1 if place >= 0 else _CORNER
-    return gain
-
-
-@compiled(borrows=True)
-def _expand(nodes: FloatArray, count: int, radius: float, series: FloatArray, box: int) -> None:
-    """Add nodes to the series of a box, in units of its radius: real and imaginary parts for u, then for v.
-
-    A node at t adds mu dt / t^(k + 1) to the coefficient of degree k, t seen from the box's centre.
-    """
-    for j in range(count):
-        inverse = 1.0 / (nodes[0, j] * nodes[0, j] + nodes[1, j] * nodes[1, j])
-        re, im = nodes[0, j] * inverse, -nodes[1, j] * inverse
-        dx, dy = nodes[2, j], nodes[3, j]
-        nodes[2, j], nodes[3, j] = dx * re - dy * im, dx * im + dy * re
-        nodes[0, j], nodes[1, j] = radius * re, radius * im
-    for degree in range(series.shape[1]):
-        a, b, c, d = 0.0, 0.0, 0.0, 0.0
-        for j in range(count):
-            re, im, u, v = nodes[2, j], nodes[3, j], nodes[4, j], nodes[5, j]
-            a += u * re
-            b += u * im
-            c += v * re
-            d += v * im
-            nodes[2, j], nodes[3, j] = (
-                re * nodes[0, j] - im * nodes[1, j],
-                re * nodes[1, j] + im * nodes[0, j],
-            )
-        series[box, degree, 0] += a
-        series[box, degree, 1] += b
-        series[box, degree, 2] += c
-        series[box, degree, 3] += d
 
 
 @compiled(borrows=True)

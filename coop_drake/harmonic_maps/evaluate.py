@@ -365,16 +365,19 @@ def solved_nodes(m: FlatMap, k: int, place: int) -> tuple[int, int]:
 
 
 @compiled(borrows=True)
-def gather(
+def add_to_series(
     m: FlatMap, k: int, place: int, level: int, opened: bool, seen: tuple[float, float, float],
-    x: float, y: float, radius: float, nodes: FloatArray,
-) -> int:  # fmt: skip
-    """Write the nodes of a source that is far from a box; return how many.
+    x: float, y: float, radius: float, nodes: FloatArray, series: FloatArray, box: int,
+) -> None:  # fmt: skip
+    """Add a source that is far from a box to the box's power series.
 
     The source is ``seen`` from the box's centre (x, y) [m]; ``radius`` is the half diagonal of the box [m],
-    ``opened`` whether refined densities are known. The nodes are columns (position seen from the centre, line
-    element, mu_u, mu_v), shape (6, .).
+    ``opened`` whether refined densities are known, ``nodes`` scratch of shape (6, .). Series are in units of
+    the radius: real and imaginary parts for u, then for v, shape (boxes, degrees, 4). A node at t adds
+    mu dt / t^(k + 1) to the coefficient of degree k, t seen from the box's centre.
     """
+    # Columns of nodes: position seen from the centre, line element, mu_u, mu_v.
+    corner = row(m, CORNERS, max(k, 0), 15)
     if (place < 0 and level == 0) or (k < 0 and (not opened or seen[1] - radius >= FAR * seen[2])):
         first, last = solved_nodes(m, k, place)
         sources, n = row(m, SOURCES, 0, 0), int(m[_HEAD + SOURCES * _ENTRY + 2])
@@ -383,9 +386,8 @@ def gather(
                 nodes[i, j - first] = m[sources + i * n + j]
             nodes[0, j - first] -= x
             nodes[1, j - first] -= y
-        return int(last - first)
-    corner = row(m, CORNERS, max(k, 0), 15)
-    if place < 0:  # The corner's compressed density at the level.
+        count = last - first
+    elif place < 0:  # The corner's compressed density at the level.
         n, grid = integer(m, CORNER_INDEX, k, 7, 2), row(m, GRID, integer(m, CORNER_INDEX, k, 7, 3), 2)
         tail = row(m, TAILS, integer(m, CORNER_INDEX, k, 7, 6) + 2 * level * n, 2)
         scale = m[corner + 8] * 0.5**level
@@ -396,15 +398,39 @@ def gather(
             nodes[0, i], nodes[1, i] = m[corner] - x + s * dx, m[corner + 1] - y + s * dy
             nodes[2, i], nodes[3, i] = w * dx, w * dy
             nodes[4, i], nodes[5, i] = m[tail + 2 * i], m[tail + 2 * i + 1]
-        return 2 * n
-    ax, ay, bx, by = panel_ends(m, k, place, level, x, y, x - m[corner], y - m[corner + 1])
-    density = _density_of(m, k, place, level)
-    hx, hy = 0.5 * (bx - ax), 0.5 * (by - ay)
-    for j in range(REFINED_NODES):
-        nodes[0, j], nodes[1, j] = 0.5 * (ax + bx) + _GAUSS_X[j] * hx, 0.5 * (ay + by) + _GAUSS_X[j] * hy
-        nodes[2, j], nodes[3, j] = _GAUSS_W[j] * hx, _GAUSS_W[j] * hy
-        nodes[4, j], nodes[5, j] = m[density + 2 * j], m[density + 2 * j + 1]
-    return REFINED_NODES
+        count = 2 * n
+    else:
+        ax, ay, bx, by = panel_ends(m, k, place, level, x, y, x - m[corner], y - m[corner + 1])
+        density = _density_of(m, k, place, level)
+        hx, hy = 0.5 * (bx - ax), 0.5 * (by - ay)
+        for j in range(REFINED_NODES):
+            nodes[0, j], nodes[1, j] = 0.5 * (ax + bx) + _GAUSS_X[j] * hx, 0.5 * (ay + by) + _GAUSS_X[j] * hy
+            nodes[2, j], nodes[3, j] = _GAUSS_W[j] * hx, _GAUSS_W[j] * hy
+            nodes[4, j], nodes[5, j] = m[density + 2 * j], m[density + 2 * j + 1]
+        count = REFINED_NODES
+    # From here nodes[:2] are radius / t, and nodes[2:4] are dt / t times the power of it for the degree.
+    for j in range(count):
+        inverse = 1.0 / (nodes[0, j] * nodes[0, j] + nodes[1, j] * nodes[1, j])
+        re, im = nodes[0, j] * inverse, -nodes[1, j] * inverse
+        dx, dy = nodes[2, j], nodes[3, j]
+        nodes[2, j], nodes[3, j] = dx * re - dy * im, dx * im + dy * re
+        nodes[0, j], nodes[1, j] = radius * re, radius * im
+    for degree in range(series.shape[1]):
+        a, b, c, d = 0.0, 0.0, 0.0, 0.0
+        for j in range(count):
+            re, im, u, v = nodes[2, j], nodes[3, j], nodes[4, j], nodes[5, j]
+            a += u * re
+            b += u * im
+            c += v * re
+            d += v * im
+            nodes[2, j], nodes[3, j] = (
+                re * nodes[0, j] - im * nodes[1, j],
+                re * nodes[1, j] + im * nodes[0, j],
+            )
+        series[box, degree, 0] += a
+        series[box, degree, 1] += b
+        series[box, degree, 2] += c
+        series[box, degree, 3] += d
 
 
 @compiled(borrows=True)

@@ -167,52 +167,32 @@ def _rates(
 
 
 @compiled(borrows=True)
-def _ready(
+def _may_leave(
     state: FloatArray,
     time: float,
     table: FloatArray,
+    target: FloatArray,
     inradius: float,
     next_edges: FloatArray,
     next_stiffness: float,
     next_table: FloatArray,
+    last: bool,
 ) -> bool:
-    """Return whether all robots are ready for the next cell."""
+    """Return whether all robots are ready for the next cell, or in the last one are at rest at the goal."""
+    m = table.shape[0]
+    if last:
+        for i in range(m):
+            if axis_arrival(table[i], state[6 + i], state[6 + m + i]) < 0.0:
+                return False
+        distance = hypot(state[0] - target[0], state[1] - target[1])
+        return bool(position_arrival(distance, hypot(state[2], state[3]), inradius) >= 0.0)
     if hand_over_margin(time, table[0, LEAVING_TIME]) < 0.0:
         return False
-    m = table.shape[0]
     for i in range(m):
         if axis_ready(table[i], next_table[i], state[6 + i], state[6 + m + i]) < 0.0:
             return False
     margin, _ = _margin(state, next_edges, next_stiffness)
     return bool(clearance_margin(margin, next_stiffness, inradius) >= 0.0)
-
-
-@compiled(borrows=True)
-def _arrived(state: FloatArray, table: FloatArray, target: FloatArray, tolerance: float) -> bool:
-    """Return whether the goal is reached and the motion has ended."""
-    m = table.shape[0]
-    for i in range(m):
-        if axis_arrival(table[i], state[6 + i], state[6 + m + i]) < 0.0:
-            return False
-    distance = hypot(state[0] - target[0], state[1] - target[1])
-    return bool(position_arrival(distance, hypot(state[2], state[3]), tolerance) >= 0.0)
-
-
-@compiled(borrows=True)
-def _steps(state: FloatArray, time: float, row: FloatArray, table: FloatArray) -> int:
-    """Return the number of integration steps until the next check, enough for the fastest motion now.
-
-    That is the spring's, p_G's, or the one with which the log term of (18) pulls at an axis where it is now.
-    """
-    fastest = max(sqrt(row[STIFFNESS]), ATTRACTION_RATE)
-    for i in range(table.shape[0]):
-        lower, upper, _, _, _, _ = bounds_of(table[i], time)
-        width, position = upper - lower, state[6 + i]
-        dl = min(max(position - lower, table[i, SATURATION] * width), width)
-        du = min(max(upper - position, table[i, SATURATION] * width), width)
-        pull = width / (dl * du) * sqrt(table[i, LOG_GAIN] * (1.0 + abs(np.log(dl / du))))
-        fastest = max(fastest, pull)
-    return int(min(max(np.ceil(PERIOD * fastest / RADIANS_PER_STEP), FEWEST_STEPS), MOST_STEPS))
 
 
 @compiled
@@ -257,11 +237,8 @@ def cross_cell(
     k1, k2, k3, k4 = np.empty(n), np.empty(n), np.empty(n), np.empty(n)
     time, next_stiffness = 0.0, governed_gains(next_row, 0.0)[0]
     while time <= time_limit:
-        if last:
-            if _arrived(state, table, path[-1], inradius):
-                return time
-        elif _ready(state, time, table, inradius, next_edges, next_stiffness, next_table):
-            for i in range(m):
+        if _may_leave(state, time, table, path[-1], inradius, next_edges, next_stiffness, next_table, last):
+            for i in range(0 if last else m):
                 x, rate = state[6 + i], state[6 + m + i]
                 if table[i, REST_RATE] > 0.0:
                     jumps[i] = rest_jump(table[i], next_table[i])
@@ -270,7 +247,17 @@ def cross_cell(
                         track_row(table[i], time, x, rate)[0] - track_row(next_table[i], 0.0, x, rate)[0]
                     )
             return time
-        steps = _steps(state, time, row, table)
+        # The steps until the next check are short enough for the fastest motion now: the spring's, p_G's, or
+        # the one with which the log term of (18) pulls at an axis where it is now.
+        fastest = max(sqrt(row[STIFFNESS]), ATTRACTION_RATE)
+        for i in range(m):
+            lower, upper, _, _, _, _ = bounds_of(table[i], time)
+            width, position = upper - lower, state[6 + i]
+            dl = min(max(position - lower, table[i, SATURATION] * width), width)
+            du = min(max(upper - position, table[i, SATURATION] * width), width)
+            pull = width / (dl * du) * sqrt(table[i, LOG_GAIN] * (1.0 + abs(np.log(dl / du))))
+            fastest = max(fastest, pull)
+        steps = int(min(max(np.ceil(PERIOD * fastest / RADIANS_PER_STEP), FEWEST_STEPS), MOST_STEPS))
         h = PERIOD / steps
         for k in range(steps):
             t = time + k * h

@@ -32,6 +32,7 @@ from coop_drake.planning.sampling.band import (
     path_clearance,
 )
 from coop_drake.planning.sampling.collision import (
+    ALL,
     FAR,
     ObstacleGrid,
     grid_for_team,
@@ -260,7 +261,7 @@ def test_a_configuration_is_as_far_from_the_walls_as_its_footprint(data: st.Data
     grid = lay_grid(polygon_rings(room()), 2.0)
     position = tuple(data.draw(st.tuples(st.floats(-2.0, 2.0), st.floats(-2.0, 2.0))))
     for z in configurations(data.draw(slices_of(tree)), seed=4, count=4, position=position):
-        found = team_clearance(team_arrays(tree), grid, place(team_arrays(tree), z), 0.5)
+        found = team_clearance(team_arrays(tree), grid, place(team_arrays(tree), z), 0.5, ALL)
         shape = footprint(tree, z)
         exact = room().boundary.distance(shape)
         if room().contains(shape) and exact > ROUNDING:

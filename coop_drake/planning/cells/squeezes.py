@@ -209,34 +209,6 @@ def convex_hull(points: FloatArray) -> FloatArray:
 
 
 @compiled
-def furthest_clear(ring: FloatArray, ux: float, uy: float, wall: FloatArray, radius: float) -> float:
-    """The largest u . x of points x of a convex ring that are no nearer to a wall than a radius [m].
-
-    It is that of a corner, or of a point where an edge is at the distance ``radius`` from the wall, because
-    the points nearer to it are a convex set. If all are nearer, it is below all u . x of the ring.
-    Shapes: ring (n, 2), wall (4,) as (x0, y0, x1, y1) [m].
-    """
-    furthest: float = (ux * ring[:, 0] + uy * ring[:, 1]).min() - _BEYOND
-    for i in range(len(ring)):
-        ax, ay, bx, by = ring[i - 1, 0], ring[i - 1, 1], ring[i, 0], ring[i, 1]
-        held = squared_distance(ax, ay, wall[0], wall[1], wall[2], wall[3]) < radius * radius
-        after = squared_distance(bx, by, wall[0], wall[1], wall[2], wall[3]) < radius * radius
-        if not after:
-            furthest = max(furthest, ux * bx + uy * by)
-        if held != after:
-            if not held:
-                ax, ay, bx, by = bx, by, ax, ay
-            for _ in range(_HALVINGS):
-                mx, my = 0.5 * (ax + bx), 0.5 * (ay + by)
-                if squared_distance(mx, my, wall[0], wall[1], wall[2], wall[3]) < radius * radius:
-                    ax, ay = mx, my
-                else:
-                    bx, by = mx, my
-            furthest = max(furthest, ux * bx + uy * by)
-    return furthest
-
-
-@compiled
 def below(ring: FloatArray, ux: float, uy: float, most: float) -> FloatArray:
     """The part of a convex ring where u . x <= most; shapes (n, 2) to (m, 2), no rows if it is empty [m]."""
     found, count = np.empty((2 * len(ring), 2)), 0
@@ -260,16 +232,38 @@ def _clear_part(
 
     Beyond the line u . x = limit all places are nearer to one wall than the radius; u is a wall's normal.
     """
+    clear = (radius - loss) * (radius - loss)
     for k in range(2 * len(walls)):
         wall, side = walls[k // 2], 1.0 - 2.0 * (k % 2)
         ux, uy = side * (wall[3] - wall[1]), side * (wall[0] - wall[2])
         length = hypot(ux, uy)
-        if length > 0.0 and len(ring) > 0:
-            ux, uy = ux / length, uy / length
-            limit = furthest_clear(ring, ux, uy, wall, radius - loss) + loss
-            if (ux * ring[:, 0] + uy * ring[:, 1]).max() > limit + loss:
-                cuts[count, 0], cuts[count, 1], cuts[count, 2] = ux, uy, limit
-                ring, count = below(ring, ux, uy, limit + loss), count + 1
+        if length == 0.0 or len(ring) == 0:
+            continue
+        ux, uy = ux / length, uy / length
+        # The largest u . x of the ring's points that keep the radius from the wall. It is that of a corner,
+        # or of a point where an edge is at this distance from the wall, because the points nearer to it are a
+        # convex set. If all are nearer, it is below all u . x of the ring.
+        furthest = (ux * ring[:, 0] + uy * ring[:, 1]).min() - _BEYOND
+        for i in range(len(ring)):
+            ax, ay, bx, by = ring[i - 1, 0], ring[i - 1, 1], ring[i, 0], ring[i, 1]
+            held = squared_distance(ax, ay, wall[0], wall[1], wall[2], wall[3]) < clear
+            after = squared_distance(bx, by, wall[0], wall[1], wall[2], wall[3]) < clear
+            if not after:
+                furthest = max(furthest, ux * bx + uy * by)
+            if held != after:
+                if not held:
+                    ax, ay, bx, by = bx, by, ax, ay
+                for _ in range(_HALVINGS):
+                    mx, my = 0.5 * (ax + bx), 0.5 * (ay + by)
+                    if squared_distance(mx, my, wall[0], wall[1], wall[2], wall[3]) < clear:
+                        ax, ay = mx, my
+                    else:
+                        bx, by = mx, my
+                furthest = max(furthest, ux * bx + uy * by)
+        limit = furthest + loss
+        if (ux * ring[:, 0] + uy * ring[:, 1]).max() > limit + loss:
+            cuts[count, 0], cuts[count, 1], cuts[count, 2] = ux, uy, limit
+            ring, count = below(ring, ux, uy, limit + loss), count + 1
     return ring, count
 
 

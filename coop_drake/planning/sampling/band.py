@@ -12,6 +12,7 @@ from coop_drake.answers.problem import PlanningProblem
 from coop_drake.jit import compiled
 from coop_drake.planning.questions import SMALLEST_MARGIN, marginal_workspace
 from coop_drake.planning.sampling.collision import (
+    ALL,
     FAR,
     ObstacleGrid,
     bodies_apart,
@@ -43,8 +44,8 @@ def _price(
 ) -> float:
     """Cost of a sample: rate[0] / (rate[1] + min(clearance, rate[2])), infinite where it is not free."""
     place_into(team, z, poses)
-    clearance = team_clearance(team, grid, poses, rate[2])
-    if clearance <= 0.0 or not bodies_apart(team, poses, gap):
+    clearance = team_clearance(team, grid, poses, rate[2], ALL)
+    if clearance <= 0.0 or not bodies_apart(team, poses, gap, ALL):
         return np.inf
     price: float = rate[0] / (rate[1] + clearance)
     return price
@@ -155,7 +156,7 @@ def clearances(team: TeamArrays, grid: ObstacleGrid, path: FloatArray, most: flo
     result, poses = np.empty(len(path)), np.empty((len(team.links), 5))
     for k in range(len(path)):
         place_into(team, path[k], poses)
-        result[k] = team_clearance(team, grid, poses, most)
+        result[k] = team_clearance(team, grid, poses, most, ALL)
     return result
 
 

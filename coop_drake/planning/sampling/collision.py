@@ -331,44 +331,43 @@ def _apart(team: TeamArrays, poses: FloatArray, a: int, b: int, gap: float) -> b
     return apart
 
 
-@compiled(inlined=True, borrows=True)
-def _pair_apart(team: TeamArrays, poses: FloatArray, k: int, gap: float) -> bool:
-    """Whether the two pieces of a pair keep the gap."""
-    a, b, discs = team.pairs[k, 0], team.pairs[k, 1], team.discs
-    A, B = team.pieces[a, 0], team.pieces[b, 0]
-    # In most pairs the discs about the pieces keep the gap already.
-    ax, ay, bx, by = discs[a, 0], discs[a, 1], discs[b, 0], discs[b, 1]
-    dx = poses[A, 0] + poses[A, 2] * ax - poses[A, 3] * ay - poses[B, 0] - poses[B, 2] * bx + poses[B, 3] * by
-    dy = poses[A, 1] + poses[A, 3] * ax + poses[A, 2] * ay - poses[B, 1] - poses[B, 3] * bx - poses[B, 2] * by
-    reach = discs[a, 2] + discs[b, 2] + gap
-    if dx * dx + dy * dy > reach * reach:
-        return True
-    return _apart(team, poses, a, b, gap) or _apart(team, poses, b, a, gap)
+ALL = -1
+"""In place of a component: all of them."""
 
 
 @compiled(borrows=True)
-def bodies_apart(team: TeamArrays, poses: FloatArray, gap: float) -> bool:
-    """Whether no two bodies come closer than the gap."""
-    k = 0
-    while k < len(team.pairs) and _pair_apart(team, poses, k, gap):
-        k += 1
-    return k == len(team.pairs)
+def bodies_apart(team: TeamArrays, poses: FloatArray, gap: float, component: int) -> bool:
+    """Whether no two bodies come closer than the gap.
+
+    Args:
+        team: The team.
+        poses: Poses of all components, or of the component and those before it, see ``place``, shape (C, 5).
+        gap: The distance [m].
+        component: Only pairs of its bodies with those of the components before it are looked at, or ``ALL``.
+    """
+    discs = team.discs
+    for k in range(len(team.pairs)):
+        a, b = team.pairs[k, 0], team.pairs[k, 1]
+        A, B = team.pieces[a, 0], team.pieces[b, 0]
+        if component >= 0 and max(A, B) != component:
+            continue
+        # In most pairs the discs about the pieces keep the gap already.
+        P, Q = poses[A], poses[B]
+        ax, ay, bx, by = discs[a, 0], discs[a, 1], discs[b, 0], discs[b, 1]
+        dx = P[0] + P[2] * ax - P[3] * ay - Q[0] - Q[2] * bx + Q[3] * by
+        dy = P[1] + P[3] * ax + P[2] * ay - Q[1] - Q[3] * bx - Q[2] * by
+        reach = discs[a, 2] + discs[b, 2] + gap
+        if dx * dx + dy * dy > reach * reach:
+            continue
+        if not _apart(team, poses, a, b, gap) and not _apart(team, poses, b, a, gap):
+            return False
+    return True
 
 
-@compiled(inlined=True, borrows=True)
-def _piece_clearance(
-    team: TeamArrays, grid: ObstacleGrid, poses: FloatArray, piece: int, most: float
+@compiled(borrows=True)
+def team_clearance(
+    team: TeamArrays, grid: ObstacleGrid, poses: FloatArray, most: float, component: int
 ) -> float:
-    """Distance of a piece from the obstacles, at most ``most``; -1 where it meets one or is outside."""
-    X, first, last = poses[team.pieces[piece, 0]], team.pieces[piece, 1], team.pieces[piece, 2]
-    return ring_clearance(
-        grid, team.vertices, first, last, team.radii[piece], team.discs[piece],
-        X[0], X[1], X[2], X[3], most,
-    )  # fmt: skip
-
-
-@compiled(borrows=True)
-def team_clearance(team: TeamArrays, grid: ObstacleGrid, poses: FloatArray, most: float) -> float:
     """Distance of the team from the obstacles, at most ``most``; -1 where it meets one or a piece is outside.
 
     Args:
@@ -376,28 +375,20 @@ def team_clearance(team: TeamArrays, grid: ObstacleGrid, poses: FloatArray, most
         grid: The floor, whose reach is that of the widest piece and ``most`` more.
         poses: Poses of all components, see ``place``, shape (C, 5).
         most: Distances above this one do not matter [m].
+        component: Whose pieces are looked at, or ``ALL``.
     """
     best = most
     for piece in range(len(team.pieces) - 1, -1, -1):
-        best = _piece_clearance(team, grid, poses, piece, best)
+        if component >= 0 and team.pieces[piece, 0] != component:
+            continue
+        X, first, last = poses[team.pieces[piece, 0]], team.pieces[piece, 1], team.pieces[piece, 2]
+        best = ring_clearance(
+            grid, team.vertices, first, last, team.radii[piece], team.discs[piece],
+            X[0], X[1], X[2], X[3], best,
+        )  # fmt: skip
         if best < 0.0:
             return -1.0
     return best
-
-
-@compiled(borrows=True)
-def component_is_free(
-    team: TeamArrays, grid: ObstacleGrid, poses: FloatArray, component: int, gap: float
-) -> bool:
-    """Whether a component touches no wall and keeps the gap from the components before it."""
-    for piece in range(len(team.pieces)):
-        if team.pieces[piece, 0] == component and _piece_clearance(team, grid, poses, piece, 0.0) < 0.0:
-            return False
-    for k in range(len(team.pairs)):
-        latest = max(team.pieces[team.pairs[k, 0], 0], team.pieces[team.pairs[k, 1], 0])
-        if latest == component and not _pair_apart(team, poses, k, gap):
-            return False
-    return True
 
 
 @compiled
@@ -419,7 +410,7 @@ def is_free_placed(
 ) -> bool:
     """As ``is_free``, with room for the poses of all components, shape (C, 5)."""
     place_into(team, z, poses)
-    return team_clearance(team, grid, poses, 0.0) >= 0.0 and bodies_apart(team, poses, gap)
+    return team_clearance(team, grid, poses, 0.0, ALL) >= 0.0 and bodies_apart(team, poses, gap, ALL)
 
 
 @compiled(borrows=True)

@@ -12,6 +12,7 @@ from shapely import MultiPolygon, Point, Polygon
 from coop_drake.answers.problem import PlanningProblem
 from coop_drake.planning.questions import relaxed
 from coop_drake.planning.sampling.collision import (
+    ALL,
     ObstacleGrid,
     bodies_apart,
     densified,
@@ -88,7 +89,7 @@ class SubsystemHierarchy:
         held = self.subsystem(tuple(robot for robot in self.robots if robot not in free))
         goal = np.array([*held.question.goal_pose, *held.question.goal_joints], dtype=float)
         ends.append((held.team, goal))
-        while most > LEAST_GAP and not all(bodies_apart(team, place(team, z), most) for team, z in ends):
+        while most > LEAST_GAP and not all(bodies_apart(team, place(team, z), most, ALL) for team, z in ends):
             most *= 0.5
         return most
 

@@ -12,9 +12,10 @@ from numpy.typing import NDArray
 from coop_drake.jit import compiled
 from coop_drake.planning.sampling.collision import (
     ObstacleGrid,
-    component_is_free,
+    bodies_apart,
     is_free_placed,
     segment_is_free,
+    team_clearance,
 )
 from coop_drake.tree.pose import FloatArray, IntArray
 from coop_drake.tree.team_arrays import TeamArrays, place_component
@@ -248,7 +249,10 @@ def draw(
     for component in range(len(team.links) if region.tries > 1 else 0):
         for number in range(1, region.tries + 1):
             place_component(team, z, component, poses)
-            if number == region.tries or component_is_free(team, grid, poses, component, gap):
+            if number == region.tries or (
+                team_clearance(team, grid, poses, 0.0, component) >= 0.0
+                and bodies_apart(team, poses, gap, component)
+            ):
                 break
             posed = team.links[component, 0] < 0
             first, last = (0, 3) if posed else (team.links[component, 1], team.links[component, 1] + 1)
