@@ -272,12 +272,6 @@ def write_bounds(table: FloatArray, time: float, bounds: FloatArray) -> None:
 # q)) and sinh s = (2 q - 1) / (2 q (1 - q)).
 
 
-@compiled
-def product_bounds(a: float, b: float, c: float, d: float) -> tuple[float, float]:
-    """Return the interval of all products of a number in [a, b] and a number in [c, d]."""
-    return min(a * c, a * d, b * c, b * d), max(a * c, a * d, b * c, b * d)
-
-
 @compiled(borrows=True)
 def slope_bounds(
     row: FloatArray, time: float, position: float, reach: float, rate: float
@@ -346,17 +340,17 @@ def slopes_between(
     from_low, from_high = 0.5 / (low * (1.0 - low)), 0.5 / (high * (1.0 - high))
     carried_low = lower_rate + low * (upper_rate - lower_rate) - rate
     carried_high = lower_rate + high * (upper_rate - lower_rate) - rate
-    turned = product_bounds(
-        s_low + from_low * (2.0 * low - 1.0), s_high + from_high * (2.0 * high - 1.0),
-        min(carried_low, carried_high), max(carried_low, carried_high),
+    bend_low, bend_high = s_low + from_low * (2.0 * low - 1.0), s_high + from_high * (2.0 * high - 1.0)
+    turned = (
+        bend_low * carried_low, bend_low * carried_high, bend_high * carried_low, bend_high * carried_high,
     )  # fmt: skip
-    spring = product_bounds(1.0 - pull_far, 1.0 - pull_near, k1 * k2 + k1_dot, k1 * k2 + k1_dot)
+    spring = (1.0 - pull_far) * (k1 * k2 + k1_dot), (1.0 - pull_near) * (k1 * k2 + k1_dot)
     closest = 2.0 if across else min(from_low, from_high)
     log_near = 4.0 * kappa / (w * w) * closest * closest * (1.0 + pull_near)
     log_far = 4.0 * kappa / (w * w) * max(from_low, from_high) ** 2 * (1.0 + pull_far)
     steady = k2 * closing - closing * closing + bending
-    x_lower = steady - spring[1] - log_far - 2.0 * k1 / w * turned[1]
-    x_upper = steady - spring[0] - log_near - 2.0 * k1 / w * turned[0]
+    x_lower = steady - max(spring) - log_far - 2.0 * k1 / w * max(turned)
+    x_upper = steady - min(spring) - log_near - 2.0 * k1 / w * min(turned)
     if first[0] < saturation or last[0] > 1.0 - saturation:
         x_lower, x_upper = min(x_lower, 0.0), max(x_upper, 0.0)
     return x_lower, x_upper, closing - k2 - k1 * (1.0 - pull_near), closing - k2 - k1 * (1.0 - pull_far)

@@ -144,8 +144,9 @@ def team_accelerations(
             inertias[p, j] += inertias[i, j]
         for j in range(3):
             forces[p, j] += forces[i, j]
-        sx, sy, w = _direction(tree[i], motion[i])
-        at = int(tree[i, RATE])
+        # What a unit rate of the joint adds to its link's velocity at the object's origin, and to w.
+        link, w, at = motion[i], tree[i, TURN], int(tree[i, RATE])
+        sx, sy = link[UX] + w * link[PY], link[UY] - w * link[PX]
         along = sx * forces[i, 0] + sy * forces[i, 1] + w * forces[i, 2]
         wanted[2 + i] = efforts[at - size] - tree[i, DAMPING] * state[at] - along
         # The row of the mass matrix of the joint that leads to link i, left of its diagonal and on it.
@@ -154,7 +155,8 @@ def team_accelerations(
         matrix[2 + i, 0], matrix[2 + i, 1], matrix[2 + i, 2] = fx, fy, torque
         matrix[2 + i, 2 + i] = sx * fx + sy * fy + w * torque + tree[i, ROTOR]
         while p > 0:
-            sx, sy, w = _direction(tree[p], motion[p])
+            link, w = motion[p], tree[p, TURN]
+            sx, sy = link[UX] + w * link[PY], link[UY] - w * link[PX]
             matrix[2 + i, 2 + p] = sx * fx + sy * fy + w * torque
             p = int(tree[p, PARENT])
     m, mx, my, turning = inertias[0, 0], inertias[0, 1], inertias[0, 2], inertias[0, 3]
@@ -167,13 +169,6 @@ def team_accelerations(
         accelerations[int(tree[0, RATE]) - size + i] = wanted[i]
     for i in range(1, tree.shape[0]):
         accelerations[int(tree[i, RATE]) - size] = wanted[2 + i]
-
-
-@compiled(borrows=True)
-def _direction(row: FloatArray, motion: FloatArray) -> tuple[float, float, float]:
-    """Return what a unit rate of a joint adds to its link's velocity at the object's origin, and to w."""
-    turn = row[TURN]
-    return motion[UX] + turn * motion[PY], motion[UY] - turn * motion[PX], turn
 
 
 @compiled(borrows=True)

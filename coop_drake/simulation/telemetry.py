@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from math import inf
 from typing import NamedTuple
 
 import numpy as np
@@ -17,11 +16,9 @@ from coop_drake.answers.log import SimulationLog
 from coop_drake.answers.plan import Plan
 from coop_drake.diagram.station import Loop, PortRow
 from coop_drake.geometry.polygons import BoundaryDistance, signed_distance
-from coop_drake.jit import compiled
 from coop_drake.laws import total_wrench
 from coop_drake.simulation.clearance import TeamClearance, team_distances
 from coop_drake.tree.pose import FloatArray, IntArray
-from coop_drake.tree.team_arrays import TeamArrays
 
 
 @dataclass(frozen=True)
@@ -173,53 +170,15 @@ WRENCH_TOLERANCE = 1e-8
 errors."""
 
 
-@compiled(borrows=True)
-def margins(
-    team: TeamArrays, walls: FloatArray, poses: FloatArray, vertices: FloatArray, discs: FloatArray,
-    z: FloatArray, cell: FloatArray, lower: FloatArray, upper: FloatArray,
-    funnel_lower: FloatArray, funnel_upper: FloatArray,
-) -> tuple[float, int, float, int, float, float, int, float, int]:  # fmt: skip
-    """Return what ``team_distances`` returns, then the margins of cell, funnels and slice.
-
-    Args:
-        team: With the next five as in ``team_distances``.
-        walls: Of the floor.
-        poses: Room for poses.
-        vertices: Room for vertices.
-        discs: Room for discs.
-        z: The configuration.
-        cell: Edges of the cell's governed set, shape (edges, 4) [m].
-        lower: Of the cell's slice, shape (1 + n,) [rad or m].
-        upper: Of the cell's slice, shape (1 + n,) [rad or m].
-        funnel_lower: Lower funnel bounds, shape (1 + n,) [rad or m].
-        funnel_upper: Upper funnel bounds, shape (1 + n,) [rad or m].
-
-    Returns:
-        Distances; signed distance of the object to its cell's boundary [m]; smallest margin to a funnel and
-        the axis; smallest margin to the slice and the axis.
-    """
-    wall, piece, between, pair = team_distances(team, walls, poses, vertices, discs, z)
-    in_cell = signed_distance(cell, z[0], z[1])
-    funnel, funnel_axis = _narrowest(z, funnel_lower, funnel_upper)
-    margin, slice_axis = _narrowest(z, lower, upper)
-    return wall, piece, between, pair, in_cell, funnel, funnel_axis, margin, slice_axis
-
-
-@compiled(borrows=True)
-def _narrowest(z: FloatArray, lower: FloatArray, upper: FloatArray) -> tuple[float, int]:
+def _narrowest(axes: FloatArray, lower: FloatArray, upper: FloatArray) -> tuple[float, int]:
     """Return the smallest distance of an axis to its interval's ends, and the axis; NaN if one is NaN."""
-    least, axis = inf, 0
-    for i in range(lower.size):
-        margin = min(z[2 + i] - lower[i], upper[i] - z[2 + i])
-        if np.isnan(z[2 + i] - lower[i]) or np.isnan(upper[i] - z[2 + i]):
-            return np.nan, i
-        if margin < least:
-            least, axis = margin, i
-    return least, axis
+    margins = np.minimum(axes - lower, upper - axes)
+    axis = int(np.argmin(margins))
+    return float(margins[axis]), axis
 
 
 class Margins(NamedTuple):
-    """What ``margins`` returns of one instant, then the others; names and units as in ``SimulationLog``.
+    """Margins of one instant; names and units as in ``SimulationLog``.
 
     Attributes:
         workspace_clearance: Distance of the nearest body to the walls [m].
@@ -271,10 +230,16 @@ class Invariants:
 
     def check(self, sample: Sample) -> Margins:
         """Measure every margin, and say which invariant is broken if one is."""
-        arguments = sample.z, *self._cells[sample.cell], sample.funnel_lower, sample.funnel_upper
-        measured = margins(*self._clearance.kernel_arguments, *arguments)
-        error = largest_difference(sample.measured_wrenches, sample.commanded_wrenches)
-        found = Margins(*measured, error, sample.energy_margin, sample.acceleration_error)
+        z, (edges, lower, upper) = sample.z, self._cells[sample.cell]
+        found = Margins(
+            *team_distances(*self._clearance.kernel_arguments, z),
+            signed_distance(edges, z[0], z[1]),
+            *_narrowest(z[2:], sample.funnel_lower, sample.funnel_upper),
+            *_narrowest(z[2:], lower, upper),
+            largest_difference(sample.measured_wrenches, sample.commanded_wrenches),
+            sample.energy_margin,
+            sample.acceleration_error,
+        )
         broken = [*self._broken(sample, found), *(_inexact(found) if self._exact else ())]
         where = f"at t = {sample.time:.6g} s in cell {sample.cell}: "
         return found._replace(violation=where + "; ".join(broken)) if broken else found
