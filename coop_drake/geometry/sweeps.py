@@ -45,17 +45,8 @@ _LARGEST_TURN = 0.75 * pi
 """Largest angle between neighbouring directions [rad]: below pi, so that neighbouring lines meet."""
 
 _PARTS_PER_ANGLE = 10.0
-"""Squared number of parts of an arc over its half-angle [1/rad]: the error of the parts is small against
-the growth of the sweep itself."""
-
-
-@compiled
-def arc_parts(half_width: float) -> int:
-    """Number of chords or tangents that replace an arc, given half of its angle [rad].
-
-    Their error vanishes faster than the slice's width.
-    """
-    return max(1, ceil(sqrt(_PARTS_PER_ANGLE * min(half_width, pi))))
+"""Squared number of chords or tangents that replace an arc over its half-angle [1/rad]: their error vanishes
+faster than the slice's width, and is small against the growth of the sweep itself."""
 
 
 @compiled
@@ -182,7 +173,7 @@ def over_revolute(vertices: FloatArray, centre: float, half_width: float) -> Flo
     Returns:
         Vertices of an enclosing convex polygon, shape (m, 2).
     """
-    count, parts = len(vertices), arc_parts(half_width)
+    count, parts = len(vertices), max(1, ceil(sqrt(_PARTS_PER_ANGLE * min(half_width, pi))))
     edges = edge_directions(vertices)
     radii = np.empty(count)
     angles = np.empty(2 * len(edges) + count * (parts + 1) + 4)
@@ -360,7 +351,7 @@ def under_revolute(vertices: FloatArray, centre: float, half_width: float) -> Fl
     half_width = min(half_width, pi)  # A joint of many turns covers no more; its chords would leap over arcs.
     edges = edge_directions(vertices)
     offsets = support(vertices, edges)
-    parts = arc_parts(half_width)
+    parts = max(1, ceil(sqrt(_PARTS_PER_ANGLE * half_width)))
     half_chord = half_width / parts
     angles, distances = np.empty(len(edges) * (2 + parts)), np.empty(len(edges) * (2 + parts))
     size = 0
@@ -378,7 +369,6 @@ def under_revolute(vertices: FloatArray, centre: float, half_width: float) -> Fl
     return half_planes_polygon(angles[:size], distances[:size])
 
 
-@compiled
 def under_prismatic(vertices: FloatArray, x0: float, y0: float, x1: float, y1: float) -> FloatArray:
     """Find points that a convex polygon covers at every displacement from (x0, y0) to (x1, y1) [m].
 
