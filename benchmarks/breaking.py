@@ -18,7 +18,7 @@ from coop_drake.answers import Found
 from coop_drake.answers.budget import Budget
 from coop_drake.answers.plan import Plan
 from coop_drake.laws.axis_table import axis_table
-from coop_drake.planning.budget.fitting import UnprovedTransition, follow_transitions
+from coop_drake.planning.budget.axis_proofs import UnprovedTransition, follow_transitions
 from coop_drake.robustness.axis_departure import axis_loop
 from coop_drake.robustness.position import PositionGains, position_tubes
 

@@ -195,6 +195,7 @@ class Tolerance:
 
     Attributes:
         age_factor: The gains are those of the gain set for this many times the age of its commands [-].
+        rate_share: They are those for this share of the limits of rates, 1 where there are none [-].
         entry_lower: Lowest position at the entry [rad or m].
         entry_upper: Highest position at the entry [rad or m].
         entry_rate_lower: Lowest rate at the entry [rad/s or m/s].
@@ -219,6 +220,7 @@ class Tolerance:
     """
 
     age_factor: Annotated[Positive, EXACT]
+    rate_share: Annotated[float, Limits(above=0.0, at_most=1.0), EXACT]
     entry_lower: Vector
     entry_upper: Vector
     entry_rate_lower: Vector

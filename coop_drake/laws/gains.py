@@ -527,6 +527,7 @@ def transition_gains(
     speed_limit: float | None = None,
     rate_limit: FloatArray | None = None,
     acceleration_limit: FloatArray | None = None,
+    rate_share: float = 1.0,
 ) -> TransitionGains:
     """Return the gains with which a transition is executed.
 
@@ -542,6 +543,7 @@ def transition_gains(
         speed_limit: Largest speed of the object's origin, None for none [m/s].
         rate_limit: Largest rate of every axis, infinity for none, shape (m,) [rad/s or m/s]; None for none.
         acceleration_limit: Largest acceleration of every axis in the same way, shape (m,).
+        rate_share: Share of the limits of rates for which decay rates are chosen [-].
 
     Returns:
         Gains of governor and funnels, and for each axis the energy V below which the transition begins.
@@ -555,7 +557,8 @@ def transition_gains(
     if isinstance(gain_set, FixedGains):  # as given, not by way of the root of K
         damping, governor_gain = float(gain_set.damping), float(gain_set.governor_gain)
     narrowest = np.full(len(resting), np.min(goal_upper[1:] - goal_lower[1:], initial=inf))
-    limits = (narrowest + inf if most is None else most for most in (rate_limit, acceleration_limit))
+    rates = None if rate_limit is None else rate_share * rate_limit
+    limits = (narrowest + inf if most is None else most for most in (rates, acceleration_limit))
     ends = slice_lower, slice_upper, goal_lower, goal_upper, resting, narrowest, *limits
     axes = np.transpose(ends).astype(float)
     rows = np.array([scheduled_axis(schedule, i > 0, *axis) for i, axis in enumerate(axes)])

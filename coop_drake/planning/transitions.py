@@ -273,6 +273,7 @@ def with_gains(
     name: str,
     limits: FloatArray | None = None,
     accelerations: FloatArray | None = None,
+    rate_share: float = 1.0,
 ) -> Plan:
     """A plan with the gains of another gain set, without a budget; its estimated times are kept.
 
@@ -282,6 +283,7 @@ def with_gains(
         name: Name under which the scenario knows them.
         limits: Largest speed of the object and rates of all axes, shape (2 + n,); those of the plan if None.
         accelerations: Largest accelerations of all axes, shape (1 + n,); those of the plan if None.
+        rate_share: Share of the limits of rates for which gains are chosen [-].
     """
     if isinstance(gain_set, ScheduledGains):
         gain_set = gain_set.slowed(plan.age_factor)
@@ -290,7 +292,7 @@ def with_gains(
     for cell, transition in zip(plan.cells, plan.transitions, strict=True):
         goals = (transition.goal_lower, transition.goal_upper)
         most = transition.gains.acceleration_limit if accelerations is None else accelerations
-        gains = _gains(gain_set, cell, transition.neck, goals, resting, limits, most)
+        gains = _gains(gain_set, cell, transition.neck, goals, resting, limits, most, rate_share)
         transitions.append(replace(transition, gains=gains, tolerance=None, governed=None))
         resting = 0.5 * (transition.goal_lower + transition.goal_upper)
     made = replace(plan, transitions=tuple(transitions), gain_set=name)
@@ -401,6 +403,7 @@ def _gains(
     resting: FloatArray,
     limits: FloatArray | None = None,
     accelerations: FloatArray | None = None,
+    rate_share: float = 1.0,
 ) -> TransitionGains:
     speed = None if limits is None or not isfinite(limits[0]) else float(limits[0])
     return transition_gains(
@@ -414,6 +417,7 @@ def _gains(
         speed_limit=speed,
         rate_limit=None if limits is None else limits[1:],
         acceleration_limit=accelerations,
+        rate_share=rate_share,
     )
 
 

@@ -68,6 +68,7 @@ def check_gains(plan: Plan, gain_sets: Mapping[str, GainSet]) -> Check:
             speed_limit=transition.gains.speed_limit,
             rate_limit=transition.gains.rate_limit,
             acceleration_limit=transition.gains.acceleration_limit,
+            rate_share=1.0 if tolerance is None else tolerance.rate_share,
         )
         if tolerance is not None:
             gains = replace(gains, rest=_rest(transition.gains.rest, gains.hand_over_time, where))
@@ -110,6 +111,9 @@ def check_ages(plan: Plan, gain_set: GainSet) -> None:
                 f"gives gains for commands {age:.6g} s old; those of nominal motions are {least:.6g} s old"
             )
             raise RefusalError(f"transitions[{k}].tolerance.age_factor", finding)
+        if transition.gains.rate_limit is None and transition.tolerance.rate_share != 1.0:
+            finding = f"is {transition.tolerance.rate_share}; no rate is limited, so that it is 1"
+            raise RefusalError(f"transitions[{k}].tolerance.rate_share", finding)
 
 
 def _rest(stated: RestCondition | None, after: float, where: str) -> RestCondition | None:

@@ -5,16 +5,20 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
 from benchmarks.sampled_plan import random_departures, run_axes, worst_departures
 from coop_drake.answers import Found
 from coop_drake.answers.budget import Budget
+from coop_drake.cli import app
 from coop_drake.cli.task import read_task
 from coop_drake.diagram.knowledge import axis_levels
 from coop_drake.laws.readiness import alarm_stage
 from coop_drake.planning.planner import plan
+from coop_drake.plant.facts import budget_of, scenario_budgets
 from coop_drake.robustness.alarms import unseen_of
 from coop_drake.shipped import scenario_file
+from coop_drake.verification import verify_plan
 
 MOBILE_BASE = Budget(
     control_rate=200.0, delay=0.01, lag=0.005, angle_noise=0.0015, rate_noise=0.03, model_error=0.2,
@@ -108,3 +112,20 @@ def test_departures_two_and_a_half_times_as_large_lose_an_axis(base):
 def test_cells_are_left_at_rest(base):
     rests = [transition.gains.rest for transition in base.transitions]
     assert all((rest.rate > 0.0).all() and (rest.reach > 0.0).all() for rest in rests)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("flags", [["--robots", "3", "--door", "1.3"], ["--robots", "4"]])
+def test_narrow_limits_of_rates_are_kept_by_gains_for_a_share_of_them(tmp_path, flags):
+    """One metre per second and two radians, as a new scenario has them, under the preset."""
+    path = tmp_path / "hall" / "hall.scenario.yaml"
+    assert CliRunner().invoke(app, ["new", "hall", *flags, "--out", str(path.parent)]).exit_code == 0
+    path.write_text(path.read_text() + "\ndeployment: {preset: mobile_base, budget: all}\n")
+    task = read_task(path)
+    gain_sets = task.scenario.gain_sets
+    budget = budget_of(None, task.scenario, task.problem)
+    answer = plan(task.problem, gain_sets["scheduled"], gain_set_name="scheduled", budget=budget)
+    assert isinstance(answer, Found)
+    assert min(one.tolerance.rate_share for one in answer.plan.transitions) < 1.0
+    budgets = scenario_budgets(task.scenario, task.problem)
+    verify_plan(answer.plan, task.problem, gain_sets, budgets=budgets)

@@ -11,7 +11,8 @@ from coop_drake.cli.task import read_task
 from coop_drake.compiled_loop import prepare, run
 from coop_drake.errors import RefusalError, ScenarioError
 from coop_drake.laws.team_dynamics import team_accelerations, team_chain, team_work
-from coop_drake.planning.budget.fitting import UnprovedTransition, fit_budget
+from coop_drake.planning.budget.axis_proofs import UnprovedTransition
+from coop_drake.planning.budget.fitting import fit_budget
 from coop_drake.planning.planner import plan
 from coop_drake.plant import planning_problem
 from coop_drake.plant.facts import budget_of, scenario_budgets

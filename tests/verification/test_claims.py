@@ -96,6 +96,7 @@ FREE = {
         "between what is settled and 0.4 of the goal interval; next cell's entry set", (1e-6, 100.0), 0
     ),
     "transitions[].gains.rest.rate[]": Free("at least what is settled; next entry set", (1e-6, 30.0), 0),
+    "transitions[].tolerance.rate_share": Free("above 0, at most 1; the gains follow from it", (2.0,)),
     "transitions[].tolerance.entry_lower[]": Free("at most " + SAFE[9:], shifts=(0.05,)),
     "transitions[].tolerance.entry_upper[]": Free(SAFE, shifts=(-0.05,)),
     "transitions[].tolerance.entry_rate_lower[]": Free("at most " + SAFE[9:], (-1.0,)),
@@ -439,6 +440,10 @@ def test_gains_for_commands_that_are_younger_than_the_teams_are_refused():
     quick = [replace(part, tolerance=own) for part, own in zip(plan.transitions, parts, strict=True)]
     with pytest.raises(RefusalError, match="those of nominal motions are"):
         check_ages(replace(plan, transitions=tuple(quick)), one.gains["scheduled"])
+    parts = [replace(part.tolerance, rate_share=0.5) for part in plan.transitions]
+    slow = [replace(part, tolerance=own) for part, own in zip(plan.transitions, parts, strict=True)]
+    with pytest.raises(RefusalError, match="no rate is limited"):
+        check_ages(replace(plan, transitions=tuple(slow)), one.gains["scheduled"])
 
 
 def test_a_stiffer_governor_than_the_gain_set_allows_is_refused():

@@ -13,9 +13,9 @@ from coop_drake.answers.plan import Plan
 from coop_drake.answers.problem import PlanningProblem
 from coop_drake.errors import GeometryError, PlanError, StallError
 from coop_drake.laws import ScheduledGains
+from coop_drake.planning.budget.axis_proofs import UnprovedTransition
 from coop_drake.planning.budget.fitting import (
     COMMAND_WEIGHTS,
-    UnprovedTransition,
     acceleration_left,
     fit_budget,
     with_acceleration,
