@@ -1,4 +1,4 @@
-"""Follows the axes of a plan through its transitions: from one entry set of nominal motions follows the next."""
+"""Follows the axes of a plan through transitions: from one entry set of nominal motions follows the next."""
 
 from __future__ import annotations
 
