@@ -441,7 +441,10 @@ def test_gains_for_commands_that_are_younger_than_the_teams_are_refused():
     with pytest.raises(RefusalError, match="those of nominal motions are"):
         check_ages(replace(plan, transitions=tuple(quick)), one.gains["scheduled"])
     parts = [replace(part.tolerance, rate_share=0.5) for part in plan.transitions]
-    slow = [replace(part, tolerance=own) for part, own in zip(plan.transitions, parts, strict=True)]
+    slow = [
+        replace(part, tolerance=own, gains=replace(part.gains, rate_limit=None))
+        for part, own in zip(plan.transitions, parts, strict=True)
+    ]
     with pytest.raises(RefusalError, match="no rate is limited"):
         check_ages(replace(plan, transitions=tuple(slow)), one.gains["scheduled"])
 
