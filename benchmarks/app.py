@@ -44,8 +44,6 @@ from coop_drake.campaign.records import CampaignFolder
 from coop_drake.cli.reporter import ExitCode, reporting
 from coop_drake.errors import ScenarioError
 
-__all__ = ["app"]
-
 _RESULTS = Path("out/bench.json")
 _FAILED, _BAD_USE, _INTERRUPTED = 1, 2, 130
 _LIMIT = 80.0

@@ -10,8 +10,6 @@ import shapely
 from scipy.spatial import ConvexHull
 from shapely import Point, Polygon, affinity, box
 
-__all__ = ["Domain", "hall_with_pillars", "standard_domains", "wavy_room"]
-
 _BODY = ((-0.2, -0.1), (0.0, -0.16), (0.18, -0.12), (0.22, 0.05), (0.1, 0.15), (-0.06, 0.17), (-0.19, 0.08))
 
 

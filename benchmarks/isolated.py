@@ -14,8 +14,6 @@ from typing import Any, Generic, TypeVar
 
 from coop_drake.errors import CoopDrakeError
 
-__all__ = ["Isolated", "WorkerError", "in_own_process", "stop_all"]
-
 T = TypeVar("T")
 
 GRACE = 15

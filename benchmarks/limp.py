@@ -23,8 +23,6 @@ from coop_drake.laws.actuators import braking_effort
 from coop_drake.scenario import Control, Floor, Hold, Scenario
 from coop_drake.tree.pose import FloatArray
 
-__all__ = ["limp", "limp_tasks"]
-
 WAYS = ("brake", "hold", "follow", "brake_with_friction")
 """What the others do: their drives brake, as in a team of processes; they hold; they follow the plan."""
 

@@ -18,8 +18,6 @@ from benchmarks.rows import Row, best_seconds, seconds
 from coop_drake.errors import FieldError
 from coop_drake.harmonic_maps import HarmonicMap, solve
 
-__all__ = ["ablation_rows", "cost_rows", "map_rows"]
-
 RESIDUAL = 1e-8
 """Largest residual on the boundary that a map may have; the estimated error is 2 M + 1 times that."""
 

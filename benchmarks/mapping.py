@@ -17,8 +17,6 @@ from coop_drake.answers import Plan
 from coop_drake.harmonic_maps import TOLERANCE, HarmonicMap, MapStore, VelocityField
 from coop_drake.simulation import build_maps
 
-__all__ = ["base_rows", "mapping_tasks"]
-
 VERTICES = (10, 30, 100, 300, 1_000)
 PILLARS = (0, 1, 6, 20, 50)
 

@@ -24,8 +24,6 @@ from coop_drake.apart.team_files import local_book, make_keys
 from coop_drake.apart.transport import Ends, Network
 from coop_drake.errors import MessagingError
 
-__all__ = ["message_tasks", "round_trip"]
-
 _TRIPS = 2000
 """Round trips of one figure: a second on a slow machine."""
 

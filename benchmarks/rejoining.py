@@ -19,8 +19,6 @@ from coop_drake.diagram import control_period
 from coop_drake.harmonic_maps import HarmonicMap
 from coop_drake.scenario import Scenario
 
-__all__ = ["killed", "label_of", "rejoining_tasks"]
-
 KILLED: dict[str, tuple[tuple[int, float], ...]] = {
     "base": ((1, 1.5), (0, 3.0), (1, 5.0), (SUPERVISOR, 3.0)),
     "three": ((1, 1.5), (2, 4.0), (1, 5.0)),

@@ -19,8 +19,6 @@ from coop_drake.plant.model_writing import polygon_body_files, write_polygon_bod
 from coop_drake.scenario import Scenario, load_scenario
 from coop_drake.simulation import build_maps
 
-__all__ = ["ring_transport"]
-
 _RADIUS = 1.0
 _CORNERS = 16
 _MODELS = ("long_blue", "long_orange", "short_green", "short_purple")

@@ -26,8 +26,6 @@ from coop_drake.plant import build_team_plant, set_configuration
 from coop_drake.scenario import Deployment, Scenario
 from coop_drake.simulation import configure_simulator, simulate
 
-__all__ = ["loop_cost", "simulating_tasks"]
-
 _FIXED_STEP_SCHEMES = ("explicit_euler", "runge_kutta2")
 _TEAMS = (2, 3, 4, 8)
 _RATE = 200.0

@@ -10,8 +10,6 @@ from benchmarks.isolated import stop_all
 from benchmarks.rows import Row
 from coop_drake.errors import CoopDrakeError
 
-__all__ = ["Done", "Rows", "Task", "chosen", "worked"]
-
 Rows = Sequence[Row]
 _POLL = 0.1
 

@@ -7,8 +7,6 @@ from functools import cache
 from coop_drake import Found, HarmonicMap, Plan, Scenario, build_maps, load_scenario, plan
 from coop_drake.errors import PlanError
 
-__all__ = ["base_plan", "base_transport"]
-
 
 @cache
 def base_plan() -> tuple[Scenario, Plan]:

@@ -15,8 +15,6 @@ from typing import IO
 from benchmarks.isolated import GRACE, Isolated
 from coop_drake.memory import peak_memory_mb
 
-__all__ = ["main"]
-
 
 def main() -> None:
     """Do one piece of work; whatever it prints goes to standard error."""

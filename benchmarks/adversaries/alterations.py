@@ -14,21 +14,6 @@ from shapely.geometry.base import BaseGeometry
 
 from benchmarks.adversaries.collisions import Document
 
-__all__ = [
-    "ANYTHING",
-    "SOUND",
-    "STATEMENTS",
-    "Alteration",
-    "Change",
-    "chosen",
-    "copied",
-    "having",
-    "in_slice",
-    "move",
-    "region_of",
-    "step",
-]
-
 Random = np.random.Generator
 
 

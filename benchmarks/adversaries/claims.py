@@ -28,8 +28,6 @@ from coop_drake.plant import planning_problem
 from coop_drake.plant.facts import budget_of, scenario_budgets
 from coop_drake.verification import verify_plan
 
-__all__ = ["judged_claims"]
-
 DEPLOYMENT = {
     "preset": "mobile_base", "budget": "all", "clock_error": 1e-4,
     "actuators": {"base_torque": 500.0, "joint_effort": 500.0},

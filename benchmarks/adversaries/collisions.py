@@ -13,8 +13,6 @@ from numpy.typing import NDArray
 from shapely import Polygon
 from shapely.geometry.base import BaseGeometry
 
-__all__ = ["Document", "FloatArray", "Team", "boxes_sampled", "floor_of", "polygon_of", "positions_sampled"]
-
 FloatArray = NDArray[np.float64]
 Document = dict[str, Any]
 

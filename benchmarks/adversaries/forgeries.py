@@ -10,8 +10,6 @@ from shapely import Polygon
 
 from benchmarks.adversaries.collisions import Document, Team
 
-__all__ = ["forged_proof"]
-
 GAPS = (0.0, 1e-16, 1e-12, 1e-9, 1e-7, 1e-6, 1e-4)
 """Widths of the cut [m]; with zero both sides share their edge."""
 

@@ -19,8 +19,6 @@ from benchmarks.rows import Row
 from benchmarks.tasks import Rows, Task
 from coop_drake.answers import PlannerSettings
 
-__all__ = ["adversary_tasks", "random_answers"]
-
 SEEDS = {11: 172, 12: 172, 13: 171}
 """Seeds of random questions, with how many are answered and checked for each."""
 

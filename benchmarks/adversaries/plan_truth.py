@@ -13,8 +13,6 @@ from shapely import LineString, Point
 
 from benchmarks.adversaries.collisions import Document, Team, boxes_sampled, polygon_of, positions_sampled
 
-__all__ = ["plan_fault"]
-
 SURELY = 1e-6
 """What is wrong by less than this, relative or in metres and radians, is not called false [-]."""
 

@@ -18,8 +18,6 @@ from benchmarks.adversaries.alterations import (
 )
 from benchmarks.adversaries.collisions import Document, Team, boxes_sampled, polygon_of, positions_sampled
 
-__all__ = ["PLAN_ALTERATIONS"]
-
 Random = np.random.Generator
 
 

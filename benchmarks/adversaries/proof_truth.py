@@ -25,8 +25,6 @@ from benchmarks.adversaries.collisions import (
     positions_sampled,
 )
 
-__all__ = ["proof_fault"]
-
 SURELY = 1e-8
 """What is wrong by less than this is not called false [m, rad]."""
 

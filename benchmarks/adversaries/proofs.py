@@ -33,8 +33,6 @@ from benchmarks.adversaries.witnesses import (
     sweep_dropped,
 )
 
-__all__ = ["PROOF_ALTERATIONS"]
-
 Random = np.random.Generator
 
 

@@ -14,8 +14,6 @@ from benchmarks.adversaries.questions import (
 from benchmarks.planner.family import corridor_problem
 from coop_drake.answers import PlanningProblem
 
-__all__ = ["SOURCES", "Ask"]
-
 Ask = Callable[[], PlanningProblem | None]
 
 PLANS: dict[str, Ask] = {

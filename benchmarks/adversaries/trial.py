@@ -26,8 +26,6 @@ from coop_drake.laws import ScheduledGains
 from coop_drake.planning.planner import plan
 from coop_drake.verification.question import question_of
 
-__all__ = ["Judged", "answered", "forged", "judged", "judged_source", "kind_of", "refusal"]
-
 
 @dataclass(frozen=True)
 class Judged:

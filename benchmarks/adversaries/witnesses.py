@@ -7,15 +7,6 @@ import numpy as np
 from benchmarks.adversaries.alterations import SOUND, Change, chosen, in_slice, move, step
 from benchmarks.adversaries.collisions import Document
 
-__all__ = [
-    "overlap_altered",
-    "overlap_forged",
-    "squeeze_altered",
-    "sweep_added",
-    "sweep_altered",
-    "sweep_dropped",
-]
-
 Random = np.random.Generator
 
 

@@ -22,8 +22,6 @@ from coop_drake.planning.cells.exploration import Exploration, Verdict
 from coop_drake.planning.channel import Channel
 from coop_drake.planning.proofs import Proofs
 
-__all__ = ["VARIANTS", "Answered", "ablation_rows", "ablation_tasks", "answer"]
-
 SLICES = 50_000
 """Slices that a variant may make; the CPU time ends most of them sooner."""
 FIRST_SLICES = 64

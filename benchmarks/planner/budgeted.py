@@ -16,8 +16,6 @@ from coop_drake.answers.budget import Budget
 from coop_drake.laws import ScheduledGains
 from coop_drake.plant.facts import budget_of
 
-__all__ = ["BUDGETS", "budget_tasks", "plan_with_budgets"]
-
 CASES = ("base", "tight", "three", "elbow", "warehouse")
 """Shipped scenarios that have a plan."""
 

@@ -11,8 +11,6 @@ from coop_drake.answers import PlanningProblem
 from coop_drake.plant import build_team_plant, planning_problem
 from coop_drake.scenario import Scenario, load_scenario
 
-__all__ = ["CASES", "Case"]
-
 _ROOT = Path(__file__).resolve().parents[2]
 _SHIPPED = _ROOT / "models"
 _HARDER = _ROOT / "benchmarks" / "scenarios"

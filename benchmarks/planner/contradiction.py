@@ -18,8 +18,6 @@ from benchmarks.rows import Row
 from benchmarks.tasks import Rows, Task
 from coop_drake.answers import PlanningProblem
 
-__all__ = ["QUESTIONS", "Patience", "contradiction_rows", "contradiction_tasks"]
-
 QUESTIONS: dict[str, Callable[[], PlanningProblem]] = {
     "closed": lambda: corridor_problem(0.77),
     "three_closed": lambda: corridor_problem(0.95, 1.5, robots=3),

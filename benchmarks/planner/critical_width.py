@@ -17,8 +17,6 @@ from benchmarks.rows import Row
 from benchmarks.tasks import Rows, Task
 from coop_drake.answers import PlanningProblem
 
-__all__ = ["CORRIDORS", "Corridor", "Interval", "critical_interval", "critical_width_tasks"]
-
 ANSWER, START_UP = 60.0, 30.0
 """CPU time of one answer, and of what a process does before: imports and questions that load kernels [s]."""
 

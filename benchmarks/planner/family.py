@@ -13,16 +13,6 @@ from coop_drake.answers import PlanningProblem
 from coop_drake.tree.component_tree import Body, Component, ComponentTree, ConvexShape, TreeJoint
 from coop_drake.tree.pose import FloatArray, PlanarPose
 
-__all__ = [
-    "corridor_floor",
-    "corridor_problem",
-    "crowd_problem",
-    "first_question",
-    "shelf_floor",
-    "shelf_problem",
-    "team_tree",
-]
-
 _JOINT_LIMIT = 1.87
 """Joints move between minus and plus this angle, as in the paper [rad]."""
 _BASE_RADIUS = 0.25

@@ -42,8 +42,6 @@ from coop_drake.tree import PlanarPose
 from coop_drake.tree.component_tree import ConvexShape, TreeJoint, configuration_scale
 from coop_drake.tree.pose import FloatArray
 
-__all__ = ["GcsRun", "run_gcs"]
-
 _SEEDS = range(1, 12)
 """Seeds of the trees, of which the first path is taken."""
 _STEP = 0.02

@@ -9,8 +9,6 @@ from rich.table import Table
 
 from benchmarks.rows import Row
 
-__all__ = ["guarantee_table"]
-
 
 class _Planner(NamedTuple):
     """A planner: its name, where its rows stand below ``planner``, the figure that counts, the guarantee."""

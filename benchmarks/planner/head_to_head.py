@@ -15,8 +15,6 @@ from benchmarks.rows import Row
 from benchmarks.tasks import Rows, Task
 from coop_drake.answers import PlanningProblem
 
-__all__ = ["Effort", "head_to_head_tasks", "judged"]
-
 IMPASSABLE_RUNS = 2
 """Runs of other planners on a question without a path: they cannot answer it and use all their time."""
 

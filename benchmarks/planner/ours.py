@@ -15,8 +15,6 @@ from coop_drake.laws import ScheduledGains
 from coop_drake.planning import warm_up
 from coop_drake.planning.planner import plan
 
-__all__ = ["Planned", "compile_kernels", "plan_once_warm", "plan_repeatedly"]
-
 
 @dataclass(frozen=True)
 class Planned:

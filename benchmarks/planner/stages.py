@@ -23,8 +23,6 @@ from coop_drake.planning import cell_selection, sampled_search
 from coop_drake.planning.sampling import band
 from coop_drake.planning.sampling.band import smoothed
 
-__all__ = ["CASES", "STAGES", "Replacement", "stage_rows", "stage_tasks", "without_stage"]
-
 CASES = ("base", "tight", "three", "elbow", "warehouse")
 """Shipped scenarios that have a plan."""
 

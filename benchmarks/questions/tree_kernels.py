@@ -11,8 +11,6 @@ from coop_drake.planning.sampling.collision import ObstacleGrid, is_free
 from coop_drake.tree.pose import FloatArray, IntArray
 from coop_drake.tree.team_arrays import TeamArrays
 
-__all__ = ["rrt_connect"]
-
 _TRAPPED, _ADVANCED, _REACHED = 0, 1, 2
 
 

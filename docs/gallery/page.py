@@ -7,8 +7,6 @@ from typing import Any
 
 from docs.gallery.cases import Case
 
-__all__ = ["answer_in_words", "gallery_page"]
-
 _TOP = """# Gallery
 
 `make gallery` runs these transports and takes the stills; `make docs` shows them here. A click on a still

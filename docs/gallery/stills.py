@@ -6,8 +6,6 @@ import shutil
 import subprocess
 from pathlib import Path
 
-__all__ = ["BrowserError", "browser", "take_still"]
-
 _BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome")
 
 _PATIENCE = 120.0

@@ -30,6 +30,10 @@ TURN = 1.3
 """How far the object turns [rad]."""
 
 
+QUIET = {"angle_noise": 0.0002, "rate_noise": 0.004}
+"""With the noise of the preset, monitors have no room at goals of joints within 0.02 rad [rad, rad/s]."""
+
+
 def deployed(**changes):
     return convert_class(Deployment.completed({"preset": "mobile_base", **changes}), Deployment)
 
@@ -39,7 +43,7 @@ def planned(counted=True):
     scenario = small_scenario("elbow")
     pose = scenario.start.object
     goal = ObjectPose(pose.x + 0.2, pose.y, pose.theta + TURN)
-    deployment = deployed(actuators={"base_force": None})
+    deployment = deployed(actuators={"base_force": None}, measurements=QUIET)
     scenario = replace(
         scenario, deployment=deployment, start=Start(pose, ARMS), limits={},
         goal=Goal(goal, ARMS, scenario.goal.tolerances),
@@ -73,7 +77,7 @@ def spared(plan, log):
 def test_axes_keep_the_stated_distances_in_a_quick_turn(mass_error):
     plan, log = run_planned(mass_error)
     assert (log.reached, log.violation) == (True, "")
-    assert np.abs(log.object_twist[:, 2]).max() > 1.2
+    assert np.abs(log.object_twist[:, 2]).max() > 0.95  # masses wrong by a fifth then leave 2 rad/s^2 of c
     assert max(check.tightest for check in check_budget_used(Rows(log, plan))) < 1.0
     assert spared(plan, log).min() > 0.0
 
