@@ -26,8 +26,8 @@ class PlannerSettings:
     """How hard the planner tries.
 
     Attributes:
-        margin: First margin rho tried; smaller ones follow, 0 last. Scaled for very large or very small teams
-            [m].
+        margin: Largest margin that ``portfolio`` keeps where it can. Scaled for very large or very small
+            teams [m].
         slice_overlap: Overlap of neighbouring slices over their width, for under-cells only.
         angle_resolution: Slices of angles are not split below this width [rad].
         length_resolution: Slices of prismatic joints are not split below this width [m].

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from math import isfinite
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import Annotated, Literal
 
 import typer
 from rich.markup import escape
@@ -15,9 +15,6 @@ from coop_drake.cli.reporter import ExitCode, Reporter
 from coop_drake.cli.results import ResultFolder
 from coop_drake.cli.summary import summary_rows
 from coop_drake.cli.task import read_task
-
-if TYPE_CHECKING:
-    pass
 
 _FEWEST, _MOST = 2, 500
 """Numbers of keyframes that make a moving picture and still fit into a page that browsers open [-]."""

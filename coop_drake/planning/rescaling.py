@@ -68,10 +68,8 @@ class Rescaling:
             return self._channel(found)
         if isinstance(found, CoveredPath):
             return self._covered(found)
-        proof, mixed = (
-            found.proof,
-            [self._scaled_box(cell, self._robot_units(cell.robots), "polygon") for cell in found.mixed],
-        )
+        mixed = [self._scaled_box(cell, self._robot_units(cell.robots), "polygon") for cell in found.mixed]
+        proof = found.proof
         if proof is not None:
             slices = tuple(map(self._slice, proof.slices))
             proof = replace(proof, point=self.unit * proof.point, slices=slices)

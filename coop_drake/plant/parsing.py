@@ -13,6 +13,7 @@ from math import isfinite, isnan
 from pathlib import Path
 from typing import Concatenate, ParamSpec, TypeVar
 from xml.parsers import expat
+from xml.sax.saxutils import quoteattr
 
 from pydrake.geometry import SceneGraph
 from pydrake.math import RigidTransform
@@ -184,8 +185,12 @@ def _number(word: str) -> float:
 
 _REPLACED = re.compile(r"invalid inertia|inertia matrix|central inertia|Using default value")
 """Warnings by which Drake says that it went on with a mass or a size other than the file's."""
-_NEEDS_ITS_PLACE = re.compile(r"<include|<world|<!(?!--)|encoding=|<uri>(?!package://)")
+_NEEDS_ITS_PLACE = re.compile(
+    r"<include|<world|<!(?!--)|encoding=|<uri\b(?!>package://)|_map\b|collision_filter"
+)
 """What an SDF file has that cannot be read as a text alone."""
+_NAME = re.compile(r"""(<model\s+name\s*=\s*)("[^"]*"|'[^']*')""")
+"""The name of the model in an SDF file, and what stands before it."""
 _FROM_TEXT = "<literal-string>.sdf"
 """How Drake's messages name a text."""
 
@@ -258,11 +263,12 @@ def _sdf_text(model: AddModel) -> str:
         text = file.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError):
         return ""
-    if text.count("<model") != 1 or re.search(
-        r"<include|<world|<!(?!--)|encoding=|<uri>(?!package://)", text
-    ):
+    reserved = model.name == "world" or model.name.startswith("__")
+    if reserved or text.count("<model") != 1 or _NEEDS_ITS_PLACE.search(text):
         return ""
-    named, count = re.subn(r"""(<model\s+name\s*=\s*)("[^"]*"|'[^']*')""", rf'\1"{model.name}"', text)
+    # A function, since a name may hold what a template of re would replace.
+    name = quoteattr(model.name)
+    named, count = _NAME.subn(lambda found: f"{found[1]}{name}", text)
     return named if count == 1 else ""
 
 

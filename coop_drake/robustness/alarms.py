@@ -105,13 +105,17 @@ def axis_room(
     drives[1:] = np.maximum(drives[1:], drives[:-1])  # within a period, it is that or the one before
     room = np.stack([one.distances(samples - 1) for one in sets], axis=1)
     for j in range(unseen):
-        driven = drives[unseen + 1 - j : unseen + 1 - j + samples]
-        driven[-1] = drives[-1]  # for ever, as large as it then is in any period
+        driven = drives[unseen + 1 - j : unseen + 1 - j + samples].copy()
+        driven[-1] = drives[-unseen - 1 :].max(axis=0)  # for ever, as large as it then is in any period
         room -= (j + 0.5) * T * T * driven
     if budget.age_error:  # what was measured then belonged to another instant
         moving = np.stack([one.moving(samples - 1, T) for one in sets], axis=2)
         rate, push = moving[1] + away.rate, moving[0] + away.acceleration
-        room -= budget.age_error * _since(rate + unseen_of(budget) * push, unseen + 1)
+        values = rate + unseen_of(budget) * push
+        if tracking.rate:  # what is judged first may have been measured in the cell before
+            known = np.array(tracking.rate) + unseen_of(budget) * np.array(tracking.acceleration)
+            values[: unseen + 1] = np.maximum(values[: unseen + 1], known)
+        room -= budget.age_error * _since(values, unseen + 1)
     own = _noises(budget, np.where(np.arange(axes) > 0, 1.0, budget.single_noise))
     wrong = mistaken(budget, tracking, axes)
     own += np.stack([wrong[0], wrong[0] + unseen_of(budget) * wrong[1]])

@@ -120,7 +120,8 @@ def check_budget(plan: Plan, tree: ComponentTree | None = None) -> Check | None:
         check_room(
             missed, room_at_entry(seen, budget), f"{where}.alarm_times", "a monitor in the cell before"
         )
-        missed = _check_axis_alarms(stated, seen, budget, leaving, where)
+        earlier = missed if leaving_since(budget, leaving) == 0 else 0.0 * missed  # still unknown when left
+        missed = np.maximum(_check_axis_alarms(stated, seen, budget, leaving, where), earlier)
         _check_rate_alarms(stated, budget, tracking, where)
         if limited is not None:
             effort, rates, commanded = transition_efforts(k, limited, every, away, loop, commanded, leaving)

@@ -111,7 +111,8 @@ def check_ages(plan: Plan, gain_set: GainSet) -> None:
                 f"gives gains for commands {age:.6g} s old; those of nominal motions are {least:.6g} s old"
             )
             raise RefusalError(f"transitions[{k}].tolerance.age_factor", finding)
-        if transition.gains.rate_limit is None and transition.tolerance.rate_share != 1.0:
+        limits = transition.gains.rate_limit
+        if (limits is None or not np.isfinite(limits).any()) and transition.tolerance.rate_share != 1.0:
             finding = f"is {transition.tolerance.rate_share}; no rate is limited, so that it is 1"
             raise RefusalError(f"transitions[{k}].tolerance.rate_share", finding)
 

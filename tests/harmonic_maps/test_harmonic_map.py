@@ -445,3 +445,9 @@ def test_a_real_cell_is_mapped_to_1e_8(question):
     assert mapped.accuracy.error_estimate <= 1e-8
     assert sample_boundary(mapped, 301).residual.max() <= 1.5e-8
     assert np.linalg.det(mapped(inside(mapped.region, 2_000))[1]).min() > 0.0
+
+
+def test_the_same_question_has_the_same_map_to_the_last_bit():
+    domain, points = box(0.0, 0.0, 2.0, 1.0).difference(box(0.8, 0.4, 1.1, 0.6)), [[0.3, 0.2], [1.6, 0.9]]
+    first, second = (HarmonicMap(domain, Point(1.7, 0.5))(points) for _ in range(2))
+    assert [part.tobytes() for part in first] == [part.tobytes() for part in second]

@@ -9,6 +9,7 @@ import pytest
 from coop_drake.answers import load_plan, save_plan
 from coop_drake.errors import RefusalError
 from coop_drake.laws.axis_table import axis_table, bounds_of, track_row
+from coop_drake.verification import budget as checks
 from coop_drake.verification.budget import check_budget, check_room
 from coop_drake.verification.runs.budget import commanded
 from tests.support.cli import invoke
@@ -276,3 +277,12 @@ def test_budgets_need_a_control_rate_and_scheduled_gains(folder):
     assert (ideal.exit_code, "control_rate" in ideal.output) == (2, True)
     fixed = invoke("plan", scenario, "--budget", folder / "budget.yaml", "--gains", "table_2")
     assert (fixed.exit_code, "scheduled gains" in " ".join(fixed.output.split())) == (2, True)
+
+
+def test_what_a_cell_misses_is_held_against_the_room_of_the_next_one(plan, monkeypatch):
+    """Room at entry that is none refuses the cell that comes after one in which something may be missed."""
+    check_budget(plan)
+    monkeypatch.setattr(checks, "room_at_entry", lambda seen, budget: np.zeros(seen.room.shape[1]))
+    with pytest.raises(RefusalError, match="a monitor in the cell before may miss") as refusal:
+        check_budget(plan)
+    assert refusal.value.where.startswith("transitions[1].tolerance.alarm_times")

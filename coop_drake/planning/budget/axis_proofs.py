@@ -210,6 +210,8 @@ def _attempt(
     alarms = _alarms(seen, budget, leaving, missed)
     if isinstance(alarms, int):
         return UnprovedTransition(k, alarms, "may leave its funnel before its monitor sees it")
+    if leaving_since(budget, leaving) == 0:  # what the cell before has missed may still be unknown
+        alarms = replace(alarms, missed=np.maximum(alarms.missed, missed))
     reached = np.empty((2, len(every)))
     for axis, sets in enumerate(every):
         reached[0, axis] = (1.0 + SLACK) * sets.fastest(found.rate[:, axis], T)
