@@ -78,8 +78,8 @@ class AxisRoom(NamedTuple):
     Attributes:
         least: Least levels of |e| and |e + t e'| that nothing within the budget exceeds, shape (2, samples,
             axes) [rad or m].
-        room: How far off its nominal motion what was missed may take an axis, from the sample until the next
-            one, shape (samples, axes) [rad or m].
+        room: Distance of the nominal axis to its funnel's bounds, less what drives the axis away unseen, from
+            the sample until the next one, shape (samples, axes) [rad or m].
     """
 
     least: FloatArray
