@@ -250,7 +250,8 @@ def _statistics(recent: FloatArray, newest: int, column: int) -> tuple[float, fl
 #
 # passes, s being by how much the age of measurements may be wrong, in which its rate takes a departure e to
 # e + t e'. So there is a level of |e + t e'|, too. All between is on the straight way from the one to the
-# other, and what is driven by at most w beside is no farther from it than w t^2 / 2. The plan leaves room for
+# other, and what is driven by at most w beside (for axes also by the model's error in the nominal
+# acceleration) is no farther from it than w t^2 / 2. The plan leaves room for
 # all of it: the strip between the governed sets and their cells is so wide, and so is the distance of a
 # nominal axis to its funnel's bounds, from the sample on for the time t, in the next cell, too, see
 # ``robustness/alarms.py``. The levels of axes change at the times since the entry that the plan states.
