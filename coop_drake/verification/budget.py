@@ -322,8 +322,8 @@ def check_room(off: FloatArray, room: FloatArray, where: str, monitor: str) -> N
     """Check that axes stay in their funnels while nobody knows of what departs.
 
     Args:
-        off: How far they may be off their nominal motions, shape (axes,) [rad or m].
-        room: How far they may be off, likewise.
+        off: Largest departures that monitors may miss, shape (axes,) [rad or m].
+        room: Departures with which the axes still stay in their funnels, shape (axes,) [rad or m].
         where: What states the levels.
         monitor: Whose levels these are, in words.
     """
