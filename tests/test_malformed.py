@@ -1,25 +1,26 @@
-"""More than two thousand malformed files: each gets exit code 2 and one message with file, key and remedy.
+"""Malformed files of every format: each gets exit code 2 and one message with file, key and remedy.
 
-Malformed is what a mutation makes so, and each says why (`Mutant.because`); none is tried first. Every group
-begins with its sound file, which is accepted: what is refused is the mutation.
+Every group begins with its sound file, which is accepted: what is refused is the mutation.
 """
 
 from __future__ import annotations
 
+import io
 import json
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from contextlib import redirect_stderr, redirect_stdout
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
 import pytest
+import typer
 from pydrake.systems.framework import DiagramBuilder
 
 from coop_drake.answers import load_plan, save_plan
 from coop_drake.answers.digest import problem_digest
 from coop_drake.answers.log import SimulationLog
 from coop_drake.answers.proof import save_proof
-from coop_drake.cli import simulate, verify
+from coop_drake.cli import app, simulate, verify
 from coop_drake.cli.task import Task, read_task
 from coop_drake.errors import PlanError
 from coop_drake.floor_plans import read_floor_plan
@@ -28,248 +29,213 @@ from coop_drake.plant import build_team_plant, planning_problem
 from coop_drake.scenario import dump_scenario, load_scenario
 from coop_drake.scenario.document import parse
 from coop_drake.verification import verify_file
+from tests.support import mutants as made
 from tests.support.cases import case
 from tests.support.certificates import GAINS, bent_corridor
-from tests.support.mutants import documents, floor_plans, models, schema, text
-from tests.support.mutants.mutant import REMEDY, Mutant, block, faults, sampled
+from tests.support.floor_plan_files import DXF
+from tests.support.mutants import Mutant, sampled
 from tests.support.robot_models import urdf_arm
 from tests.support.small_plan import small_plan
 from tests.support.small_scenario import small_scenario
 from tests.support.synthetic_log import synthetic_log
 
 MODELS = Path(__file__).parents[1] / "models"
-ROBOT = "directives[1]"
-LONG_BLUE = (MODELS / "long_blue.sdf").read_bytes()
-FORKED = urdf_arm().encode()
-CORRIDORS = (bent_corridor(0.58), bent_corridor(0.45), bent_corridor(1.2, goal=(5.6, 5.0, 0.1)))
-"""No way between slices, by a disc alone, and with a blocked goal."""
+COMMAND, REMEDY = typer.main.get_command(app), "; expected "
+ROBOT = {"sdf": (MODELS / "long_blue.sdf").read_bytes(), "urdf": urdf_arm().encode()}
+CORRIDORS = {"slices": bent_corridor(0.45), "blocked goal": bent_corridor(1.2, goal=(5.6, 5.0, 0.1))}
 
 
-def shipped(name: str):
-    return parse((MODELS / f"{name}.scenario.yaml").read_text())
+def faults(mutant: Mutant, file: Path, arguments: list[str], remedy: str = REMEDY) -> list[str]:
+    """What is wrong with a command's answer to a mutant in the place of a file."""
+    file.unlink(missing_ok=True)  # Some file systems write a file that is truncated to the disk at once.
+    file.write_bytes(mutant.content)
+    before, said, complained = sorted(file.parent.iterdir()), io.StringIO(), io.StringIO()
+    try:
+        with redirect_stdout(said), redirect_stderr(complained):
+            code = COMMAND.main([*arguments, "--json"], standalone_mode=False)
+    except BaseException as error:
+        return [f"raised {type(error).__name__}: {str(error)[:200]}"]
+    answers = said.getvalue().splitlines()
+    message = json.loads(answers[-1]).get("error", "") if answers else ""
+    wrong = {
+        f"exit code {code}": code != 2,
+        "standard output is no single JSON object with an error": len(answers) != 1 or not message,
+        f"the key {mutant.key} is not named": mutant.key not in message,
+        "file or remedy are not named": not all(file.name in k and remedy in k for k in message.splitlines()),
+        f"the message has {len(message)} characters": len(message) > 2000,
+        f"standard error says {complained.getvalue()!r}": complained.getvalue() != f"Error: {message}\n",
+        "something was written": sorted(file.parent.iterdir()) != before,
+    }
+    return [f"{mutant.kind}: {fault} -- {message[:240]}" for fault, found in wrong.items() if found]
 
 
-@cache
-def spelt_out():
-    """The base scenario with every section that it leaves to its default."""
-    return parse(dump_scenario(load_scenario(MODELS / "base.scenario.yaml")))
+def assert_refused(mutants: list[Mutant], file: Path, *arguments: str, remedy: str = REMEDY) -> None:
+    found = [fault for mutant in mutants for fault in faults(mutant, file, list(arguments), remedy)]
+    assert len(mutants) > 10
+    assert not found, f"{len(found)} of {len(mutants)}:\n" + "\n".join(found[:20])
 
 
-@cache
-def planned():
-    """A sound plan as a document, and the task that it belongs to."""
-    scenario = small_scenario()
-    problem = planning_problem(scenario, build_team_plant(scenario, DiagramBuilder()))
-    names = tuple(joint.name for joint in problem.tree.joints)
-    plan = replace(small_plan(names), problem=problem_digest(problem))
-    return plan, Task(scenario, problem)
-
-
-def document_of(save: Callable[[Path], object], path: Path):
-    save(path)
-    return json.loads(path.read_text())
-
-
-SCENARIOS: dict[str, Callable[[], list[Mutant]]] = {
-    "schema": lambda: [
-        *sampled(schema.schema_mutants(spelt_out()), 330, 1),
-        *sampled(schema.schema_mutants(shipped("elbow")), 60, 2),
-    ],
-    "text": lambda: [
-        *text.encoding_mutants(block(shipped("tight")).encode(), 60, 5),
-        *text.yaml_mutants(shipped("closed"), 6),
-    ],
-}
-MODEL_FILES: dict[str, Callable[[], list[Mutant]]] = {
-    "sdf": lambda: [
-        *models.xml_mutants(LONG_BLUE, ROBOT, 9),
-        *sampled(models.number_mutants(LONG_BLUE, ROBOT), 50, 10),
-        *sampled(models.element_mutants(LONG_BLUE, ROBOT), 10, 11),
-        *models.edited_mutants(LONG_BLUE, models.SDF_EDITS, ROBOT),
-    ],
-    "urdf": lambda: [
-        *models.xml_mutants(FORKED, ROBOT, 12),
-        *sampled(models.number_mutants(FORKED, ROBOT), 45, 13),
-        *sampled(models.element_mutants(FORKED, ROBOT), 35, 14),
-    ],
-}
-"""Model files by their ending."""
-GEOJSON, MAP = json.dumps(floor_plans.GEOJSON).encode(), block(floor_plans.MAP).encode()
-DRAWINGS: dict[str, tuple[bytes, Callable[[], list[Mutant]]]] = {
-    "hall.svg": (floor_plans.SVG, lambda: list(floor_plans.svg_mutants(24))),
-    "hall.dxf": (floor_plans.DXF, lambda: list(floor_plans.dxf_mutants(31))),
-    "hall.wkt": (
-        floor_plans.WKT,
-        lambda: [*floor_plans.wkt_mutants(25), *text.encoding_mutants(floor_plans.WKT, 10, 26)],
-    ),
-    "hall.geojson": (
-        GEOJSON,
-        lambda: [*floor_plans.geojson_mutants(27), *text.encoding_mutants(GEOJSON, 10, 28)],
-    ),
-    "map.yaml": (MAP, lambda: [*floor_plans.map_mutants(), *text.encoding_mutants(MAP, 10, 29)]),
-    "map.pgm": (floor_plans.PICTURE, lambda: list(floor_plans.picture_mutants(30))),
-}
-"""Floor plans, each with what it holds when it is sound."""
-COUNTS = {
-    "schema": 390,
-    "text": 270,
-    "sdf": 122,
-    "urdf": 130,
-    "hall.svg": 46,
-    "hall.dxf": 150,
-    "hall.wkt": 62,
-    "hall.geojson": 162,
-    "map.yaml": 88,
-    "map.pgm": 16,
-    "plan": 477,
-    "proof 0": 138,
-    "proof 1": 116,
-    "proof 2": 73,
-    "log": 197,
-}
-"""At least so many different files in each group."""
-
-
-@dataclass
-class Bench:
-    """A folder for mutants, and what was found wrong with the answers to them."""
-
-    folder: Path
-
-    def judge(self, mutants: list[Mutant], group: str, file: str, *arguments: str) -> None:
-        """Every mutant gets the answer that it must, and there are as many as promised."""
-        check_count(mutants, group)
-        out = self.folder / "out"
-        command = [*arguments, "--out", str(out)] if arguments[0] != "verify" else list(arguments)
-        wrong = [
-            f"{mutant.kind} at {mutant.place} ({mutant.because}): {fault}"
-            for mutant in mutants
-            for fault in faults(mutant, self.folder / file, command, out)
-        ]
-        assert not wrong, f"{len(wrong)} of {len(mutants)}:\n" + "\n".join(wrong[:20])
-
-
-def check_count(mutants: list[Mutant], group: str) -> None:
-    assert len({mutant.content for mutant in mutants}) >= COUNTS[group]
-    assert all(mutant.because for mutant in mutants)
-
-
-@pytest.fixture
-def bench(tmp_path) -> Iterator[Bench]:
-    return Bench(tmp_path)
+def scenario_mutants(group: str) -> list[Mutant]:
+    base = parse(dump_scenario(load_scenario(MODELS / "base.scenario.yaml")))
+    if group == "types":
+        return sampled(made.typed_mutants(base, skip=("directives",)), 150, 1)
+    return list(made.yaml_mutants(base, 6))
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("group", SCENARIOS)
-def test_malformed_scenarios_are_refused(group, bench):
-    load_scenario(MODELS / "base.scenario.yaml")
-    file = bench.folder / "mutant.scenario.yaml"
-    bench.judge(SCENARIOS[group](), group, file.name, "plan", str(file))
+@pytest.mark.parametrize("group", ["types", "text"])
+def test_malformed_scenarios_are_refused(group, tmp_path):
+    file = tmp_path / "mutant.scenario.yaml"
+    assert_refused(scenario_mutants(group), file, "plan", str(file), "--out", str(tmp_path / "out"))
 
 
-@pytest.mark.parametrize("ending", MODEL_FILES)
-def test_malformed_models_are_refused(ending, bench):
-    base = (MODELS / "base.scenario.yaml").read_text()
-    team = base.replace("package://coop_drake_models/long_blue.sdf", f"robot.{ending}")
-    scenario = bench.folder / "team.scenario.yaml"
-    scenario.write_text(team if ending == "sdf" else team.replace("robot_0: [0.0]", "robot_0: [0.0, 0.0]"))
-    (bench.folder / f"robot.{ending}").write_bytes(LONG_BLUE if ending == "sdf" else FORKED)
+@pytest.mark.parametrize("ending", ROBOT)
+def test_malformed_models_are_refused(ending, tmp_path):
+    text = (MODELS / "base.scenario.yaml").read_text()
+    text = text.replace("package://coop_drake_models/long_blue.sdf", f"robot.{ending}")
+    scenario, file = tmp_path / "team.scenario.yaml", tmp_path / f"robot.{ending}"
+    scenario.write_text(text if ending == "sdf" else text.replace("robot_0: [0.0]", "robot_0: [0.0, 0.0]"))
+    file.write_bytes(ROBOT[ending])
     read_task(scenario, None)
-    bench.judge(MODEL_FILES[ending](), ending, f"robot.{ending}", "plan", str(scenario))
+    mutants = made.model_mutants(ROBOT[ending], "directives[1]", 9, 60)
+    assert_refused(mutants, file, "plan", str(scenario), "--out", str(tmp_path / "out"))
+
+
+SVG = (
+    b'<svg xmlns="http://www.w3.org/2000/svg" width="10000mm" height="6000mm" viewBox="0 0 10 6">'
+    b'<g transform="translate(0,0)"><path d="M 0 0 H 10 V 6 H 0 Z"/>'
+    b'<rect x="2" y="2" width="1" height="0.5"/><circle cx="7" cy="3" r="0.5"/></g></svg>'
+)
+WKT = b"POLYGON ((0 0, 9 0, 9.5 4, 5 5.25, 0 4, 0 0), (2 2, 3 2, 2.5 3, 2 2))"
+GEOJSON = {
+    "type": "FeatureCollection",
+    "features": [
+        {
+            "type": "Feature",
+            "properties": None,
+            "geometry": {"type": "Polygon", "coordinates": [[[0, 0], [10, 0], [10, 6], [0, 6], [0, 0]]]},
+        }
+    ],
+}
+MAP = {
+    "image": "map.pgm",
+    "resolution": 0.1,
+    "origin": [0.0, 0.0, 0.0],
+    "negate": 0,
+    "occupied_thresh": 0.65,
+    "free_thresh": 0.196,
+}
+PICTURE = b"P5\n40 30\n255\n" + bytes(254 for _ in range(40 * 30))
+DRAWINGS = {
+    "hall.svg": SVG,
+    "hall.dxf": DXF,
+    "hall.wkt": WKT,
+    "hall.geojson": made.in_json(GEOJSON),
+    "map.yaml": made.in_yaml(MAP),
+    "map.pgm": PICTURE,
+}
+"""Floor plans, each with what it holds when it is sound."""
+
+
+def drawing_mutants(name: str) -> list[Mutant]:
+    content = DRAWINGS[name]
+    if name == "map.pgm":
+        return [Mutant(f"cut off at {place}", content[:place]) for place in range(1, len(content) - 1, 90)]
+    if name == "hall.dxf":
+        return [
+            Mutant(f"cut off at {n}", content[:n]) for n in range(9, len(content) - 5, 40)
+        ] + dxf_numbers()
+    end = {"hall.svg": content.rfind(b"</"), "hall.wkt": content.rfind(b")"), "map.yaml": 16}.get(name)
+    broken = list(made.broken_text(content, 15, 10, end=end))
+    if name == "hall.svg":  # XML may have another encoding.
+        return [one for one in broken if not one.kind.startswith("as utf")]
+    if name == "map.yaml":
+        wrong = [Mutant(one.kind, one.content, one.key.partition("[")[0]) for one in made.typed_mutants(MAP)]
+        return broken + [one for one in wrong if one.key not in ("colour", "image")]
+    if name == "hall.geojson":
+        places = [
+            place for place, _ in made.leaves(GEOJSON) if place and place[-1] in ("type", "coordinates")
+        ]
+        gone = [
+            Mutant(f"missing {place}", made.in_json(made.without(GEOJSON, place)))
+            for place in places
+            if len(place) != 3  # A feature without a type is caught by its collection alone.
+        ]
+        wrong = made.typed_mutants(GEOJSON["features"][0]["geometry"], made.in_json, skip=("colour",))
+        return broken + gone + [Mutant(one.kind, one.content) for one in wrong if one.key != "colour"]
+    return broken
+
+
+def dxf_numbers() -> list[Mutant]:
+    """Every number of an entity as something that is none, and gone with or without its code."""
+    tags, found = DXF.decode().splitlines(), []
+    for place in range(tags.index("ENTITIES") + 1, len(tags) - 1, 2):
+        if tags[place] in ("10", "20", "11", "21", "40", "50", "51"):
+            wrong = [[tags[place], word] for word in ("wide", "nan", "inf", "1e400")] + [[], [tags[place]]]
+            for tag in wrong:
+                lines = [*tags[:place], *tag, *tags[place + 2 :]]
+                found.append(Mutant(f"{tag} at {place}", ("\n".join(lines) + "\n").encode()))
+    return found
 
 
 @pytest.mark.parametrize("name", DRAWINGS)
 def test_malformed_floor_plans_are_refused(name, tmp_path):
-    for other, (content, _) in DRAWINGS.items():
+    for other, content in DRAWINGS.items():
         (tmp_path / other).write_bytes(content)
-    read_floor_plan(tmp_path / ("map.yaml" if name == "map.pgm" else name))
-    mutants, file = DRAWINGS[name][1](), tmp_path / name
-    check_count(mutants, name)
-    command = ["floor-plan", str(tmp_path / ("map.yaml" if name == "map.pgm" else name))]
-    wrong = [
-        (mutant, found)
-        for mutant in mutants
-        if (found := faults(mutant, file, command, tmp_path / "out", "; "))
+    file = tmp_path / ("map.yaml" if name == "map.pgm" else name)
+    read_floor_plan(file)
+    assert_refused(drawing_mutants(name), tmp_path / name, "floor-plan", str(file), remedy="; ")
+
+
+def test_malformed_plans_are_refused(tmp_path, monkeypatch):
+    scenario = small_scenario()
+    problem = planning_problem(scenario, build_team_plant(scenario, DiagramBuilder()))
+    names = tuple(joint.name for joint in problem.tree.joints)
+    plan, file = replace(small_plan(names), problem=problem_digest(problem)), tmp_path / "mutant.json"
+    monkeypatch.setattr(simulate, "read_task", lambda *_, **__: Task(scenario, problem))
+    assert load_plan(save_plan(plan, file)).joint_names == plan.joint_names
+    document = json.loads(file.read_text())
+    skip = ("digest", "problem", "gain_set", "format", "version")
+    mutants = [
+        *sampled(made.typed_mutants(document, made.signed, skip=skip, required=True), 200, 15),
+        *made.plan_mutants(document),
+        *made.polygon_mutants(document),
+        *made.json_mutants(document, 18),
+        *made.unsigned_mutants(document, 17),
     ]
-    assert not wrong, wrong[:10]
-
-
-def plan_mutants(folder: Path) -> list[Mutant]:
-    plan, _ = planned()
-    document = document_of(lambda path: save_plan(plan, path), folder / "plan.json")
-    return [
-        *sampled(documents.document_mutants(document, 7), 300, 15),
-        *sampled(documents.plan_mutants(document), 60, 16),
-        *documents.digest_mutants(document),
-        *documents.unsigned_mutants(document, 17, 40),
-        *documents.json_mutants(document, 18),
-        *text.encoding_mutants(json.dumps(document).encode(), 20, 19),
-    ]
-
-
-def test_malformed_plans_are_refused(bench, monkeypatch):
-    plan, task = planned()
-    monkeypatch.setattr(simulate, "read_task", lambda *_, **__: task)
-    file = save_plan(plan, bench.folder / "mutant.json")
-    assert load_plan(file).joint_names == plan.joint_names
-    bench.judge(
-        plan_mutants(bench.folder), "plan", file.name, "simulate", "small.scenario.yaml", "--plan", str(file)
-    )
+    command = ("simulate", "small.scenario.yaml", "--plan", str(file), "--out", str(tmp_path / "out"))
+    assert_refused(mutants, file, *command)
 
 
 @cache
-def proved(index: int):
-    """A question of a kind and its answer."""
-    answer, _ = find_channel(CORRIDORS[index])
+def proved(kind: str):
+    answer, _ = find_channel(CORRIDORS[kind])
     return answer.proof
 
 
-def proof_mutants(index: int, folder: Path) -> list[Mutant]:
-    problem = CORRIDORS[index]
-    document = document_of(lambda path: save_proof(proved(index), problem, path), folder / "proof.json")
-    return [
-        *sampled(documents.document_mutants(document, (60, 12, 1)[index]), (140, 60, 50)[index], 20),
-        *(documents.json_mutants(document, 21) if index == 1 else ()),
-        *(text.encoding_mutants(json.dumps(document).encode(), 10, 22) if index == 2 else ()),
-    ]
-
-
-@pytest.mark.slow
-@pytest.mark.no_cover
-@pytest.mark.parametrize("index", range(len(CORRIDORS)))
-def test_malformed_proofs_are_refused(index, bench, monkeypatch):
-    problem = CORRIDORS[index]
-    task = Task(load_scenario("base"), problem)
-    monkeypatch.setattr(verify, "read_task", lambda *_, **__: task)
-    file = bench.folder / "mutant.json"
-    save_proof(proved(index), problem, file)
+@pytest.mark.parametrize("kind", CORRIDORS)
+def test_malformed_proofs_are_refused(kind, tmp_path, monkeypatch):
+    problem, file = CORRIDORS[kind], tmp_path / "mutant.json"
+    monkeypatch.setattr(verify, "read_task", lambda *_, **__: Task(load_scenario("base"), problem))
+    save_proof(proved(kind), problem, file)
     assert verify_file(file, problem, GAINS).answer == "infeasible"
-    bench.judge(
-        proof_mutants(index, bench.folder),
-        f"proof {index}",
-        file.name,
-        "verify",
-        str(file),
-        "corridor.scenario.yaml",
-    )
-
-
-def log_mutants(folder: Path) -> list[Mutant]:
-    path = folder / "sound.npz"
-    synthetic_log(case("base"), samples=5).save(path)
-    return list(documents.archive_mutants(path.read_bytes(), 23))
+    document = json.loads(file.read_text())
+    skip = ("digest", "problem", "format", "version", "squeezes")
+    mutants = [
+        *sampled(made.typed_mutants(document, made.signed, skip=skip, required=True), 60, 20),
+        *sampled(made.polygon_mutants(document), 16, 21),
+        *made.json_mutants(document, 21),
+    ]
+    assert_refused(mutants, file, "verify", str(file), "corridor.scenario.yaml")
 
 
 def test_malformed_logs_are_refused(tmp_path):
-    """No command reads a log; who does gets an error that a command would answer with exit code 2."""
-    mutants, file = log_mutants(tmp_path), tmp_path / "mutant.npz"
-    check_count(mutants, "log")
-    assert SimulationLog.load(tmp_path / "sound.npz").reached
-    for mutant in mutants:
+    """No command reads a log alone; who does gets an error that a command would answer with exit code 2."""
+    file = tmp_path / "mutant.npz"
+    synthetic_log(case("base"), samples=5).save(file)
+    assert SimulationLog.load(file).reached
+    for mutant in made.log_mutants(file.read_bytes(), 23):
         file.write_bytes(mutant.content)
         with pytest.raises(PlanError) as caught:
             SimulationLog.load(file)
-        message = str(caught.value)
-        assert file.name in message, mutant
-        assert mutant.key in message, mutant
-        assert REMEDY in message, mutant
+        assert all(part in str(caught.value) for part in (file.name, mutant.key, REMEDY)), mutant.kind

@@ -84,8 +84,8 @@ class Reporter:
         self.code = ExitCode.DONE
         self._machine = machine
         self._compiled_said = -math.inf
-        self._console = Console(stderr=machine, quiet=quiet, highlight=False)
-        self._errors = Console(stderr=True, highlight=False)
+        self._console = Console(stderr=machine, quiet=quiet, highlight=False, emoji=False)
+        self._errors = Console(stderr=True, highlight=False, emoji=False)
         # Colours may be forced on a file, bars that are drawn over and over may not.
         stream = self._console.file
         self._moving = not quiet and stream.isatty() and not self._console.is_dumb_terminal

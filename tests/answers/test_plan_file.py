@@ -15,7 +15,7 @@ from coop_drake.laws import ScheduledGains
 from coop_drake.planning import make_plan
 from tests.support.cases import case
 from tests.support.channels import bent_channel
-from tests.support.mutants.mutant import put
+from tests.support.mutants import put
 from tests.support.synthetic_log import synthetic_plan
 
 

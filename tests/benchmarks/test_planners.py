@@ -1,23 +1,19 @@
 """Questions of growing size, our planner and its peers on them: what is asked, counted and credited."""
 
 import pickle
-from math import isfinite
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from benchmarks.isolated import Isolated
-from benchmarks.planner import contradiction, critical_width, growth
-from benchmarks.planner.ablation import VARIANTS, answer
+from benchmarks.planner import contradiction
 from benchmarks.planner.cases import CASES
 from benchmarks.planner.contradiction import Patience, contradiction_rows
-from benchmarks.planner.critical_width import CORRIDORS, Corridor, critical_interval, critical_width_rows
+from benchmarks.planner.critical_width import Corridor, critical_interval
 from benchmarks.planner.family import (
     corridor_problem,
     crowd_problem,
     first_question,
-    shelf_floor,
     shelf_problem,
 )
 from benchmarks.planner.gcs_peer import run_gcs
@@ -62,14 +58,6 @@ def test_questions_can_be_started_have_as_many_joints_as_asked_and_are_the_same_
     assert pickle.dumps(team_arrays(problem.tree)) == pickle.dumps(team_arrays(again.tree))
 
 
-@pytest.mark.parametrize("vertices", [50, 500, 5_000])
-def test_warehouses_have_about_as_many_vertices_as_asked(vertices):
-    floor = shelf_floor(vertices)
-    made = sum(len(ring.coords) - 1 for ring in (floor.exterior, *floor.interiors))
-    assert floor.is_valid
-    assert abs(made - vertices) <= 4
-
-
 @pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
 def test_every_scenario_file_can_be_read_and_the_family_holds_the_shipped_one(case):
     problem = case.problem()
@@ -82,14 +70,6 @@ def test_every_scenario_file_can_be_read_and_the_family_holds_the_shipped_one(ca
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("variant", VARIANTS)
-def test_every_variant_answers_an_easy_question(variant):
-    answered = answer(EASY, variant)
-    assert answered.answer == "found"
-    assert answered.slices > 0
-
-
-@pytest.mark.slow
 @pytest.mark.parametrize("variant", STAGES)
 def test_a_plan_is_found_without_any_one_stage(variant):
     replaced = [(part.module, part.name, getattr(part.module, part.name)) for part in STAGES[variant]]
@@ -97,26 +77,6 @@ def test_a_plan_is_found_without_any_one_stage(variant):
     assert planned.answer == "found"
     assert planned.transport_seconds > 0.0
     assert all(getattr(module, name) is value for module, name, value in replaced)
-
-
-def _think_forever(problem):
-    while True:
-        pass
-
-
-@pytest.mark.slow
-def test_out_of_time_is_no_answer(monkeypatch):
-    monkeypatch.setattr(growth, "plan_once_warm", _think_forever)
-    rows = growth.growth_rows("planner/growth/none/1", EASY, limit=1)
-    assert [row.figure for row in rows] == ["answer", "peak_memory"]
-    assert (rows[0].value, rows[0].unit) == (0.0, "none within 1 CPU s")
-
-
-@pytest.mark.slow
-def test_the_same_question_has_the_same_answer_and_is_not_asked_again_without_patience():
-    first, second = plan_repeatedly(EASY, 2, patience=100.0)
-    assert (first.answer, first.slices, first.cells) == (second.answer, second.slices, second.cells)
-    assert len(plan_repeatedly(EASY, 5, patience=0.0)) == 1
 
 
 @pytest.mark.parametrize("run", [run_trees, run_ompl])
@@ -186,21 +146,6 @@ def test_bounds_meet_at_the_critical_width_and_undecided_ones_keep_them_apart():
     assert 0.74 < found.way <= 0.741
     assert all(0.72 <= width <= 0.74 for width in found.undecided)
     assert len(found.seconds) < 20
-
-
-def test_a_bound_that_takes_too_long_is_unknown(monkeypatch):
-    ended = SimpleNamespace(value=None)
-    monkeypatch.setattr(critical_width, "in_own_process", lambda *given, limit: ended)
-    rows = critical_width_rows("two", Corridor(lambda width: width, 0.7, 0.8, 1e-3), 60.0)
-    assert all(isfinite(row.value) for row in rows)
-    assert (rows[0].name, rows[0].value, rows[0].unit) == ("two/answer", 0.0, "unknown to unknown")
-    assert rows[1].unit == "of 2 widths"
-
-
-@pytest.mark.parametrize("name", CORRIDORS)
-def test_corridors_are_questions_of_their_width(name):
-    corridor = CORRIDORS[name]
-    assert corridor.ask(corridor.narrow).workspace.area < corridor.ask(corridor.wide).workspace.area
 
 
 @pytest.mark.slow

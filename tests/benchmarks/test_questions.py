@@ -18,7 +18,6 @@ from benchmarks.questions.answering import (
     QuestionRecord,
     answer,
     ask,
-    question_batches,
     sampled_margin,
 )
 from benchmarks.questions.floors import FLOORS, random_floor
@@ -26,7 +25,7 @@ from benchmarks.questions.peers import Searched, fault_of, search_by_peers
 from benchmarks.questions.question import narrowest_corridor, random_question
 from benchmarks.questions.settings import QuestionSettings
 from benchmarks.questions.summary import summarise_questions
-from benchmarks.questions.teams import SHAPES, random_count, random_team
+from benchmarks.questions.teams import SHAPES
 from benchmarks.study import Results, Study, batches_of, load_study
 from coop_drake.answers import Found, Infeasible, Undecided
 from coop_drake.answers.plan import SearchReport
@@ -99,16 +98,6 @@ def test_floors_hold_the_regions_of_start_and_goal(kind):
         assert floor.polygon.intersects(floor.first)
         assert floor.polygon.intersects(floor.last)
         assert isnan(floor.width) if kind == "room" else 0.5 < floor.width < 2.0
-
-
-def test_teams_have_every_shape_every_number_of_joints_and_sliding_ones():
-    random = np.random.default_rng(2)
-    teams = [team for team in (random_team(random, 3, 3) for _ in range(200)) if team is not None]
-    assert {team.shape for team in teams} == set(SHAPES)
-    assert {len(arm.slides) for team in teams for arm in team.arms} == {1, 2, 3}
-    assert {team.kind for team in teams} >= {"U", "U, prismatic"}
-    counts = [random_count(random, (2, 3, 4, 5)) for _ in range(400)]
-    assert counts.count(2) > counts.count(3) > counts.count(4) > counts.count(5) > 0
 
 
 def test_the_narrowest_corridor_of_a_bar_is_as_wide_as_the_bar():
@@ -303,16 +292,6 @@ def written(folder, batch, **changes):
     folder.write(batch, [replace(record, question=number) for number in range(batch.first, batch.stop)])
 
 
-def test_more_questions_and_other_floors_change_only_the_batches_that_they_concern():
-    asked = QuestionSettings(count=5, batch=2)
-    few, many = list(question_batches(asked)), list(question_batches(replace(asked, count=8)))
-    assert [(one.first, one.stop) for one in few] == [(0, 2), (2, 4), (4, 5)]
-    assert [one.digest for one in few[:2]] == [one.digest for one in many[:2]]
-    assert few[2].digest != many[2].digest
-    others = {one.digest for one in question_batches(replace(asked, floors=("door",)))}
-    assert others.isdisjoint(one.digest for one in few)
-
-
 @pytest.mark.slow
 def test_a_process_answers_as_this_one_does(asked, tmp_path):
     folder = CampaignFolder(tmp_path)
@@ -341,18 +320,3 @@ def test_a_wrong_answer_is_counted_and_fails_the_command(asked, tmp_path):
     assert failed.exit_code == 1
     every = json.loads(failed.stdout)["questions"][-1]
     assert (every["count"], every["plans"], every["wrong"]) == (5, 5, 1)
-
-
-def test_batches_that_other_sources_made_are_counted(asked, tmp_path):
-    folder = CampaignFolder(tmp_path)
-    for batch, sources in zip(batches_of(asked, folder), (source_digest(), "0" * 64), strict=False):
-        written(folder, batch)
-        folder.note(batch, {"runs": 1, "cpu_seconds": 1.0, "sources": sources})
-    status = CliRunner().invoke(app, ["study", "--status", str(asked.path), "--out", str(tmp_path), "--json"])
-    assert json.loads(status.stdout)["batches_by_other_sources"] == 1
-
-
-def test_a_question_is_written_as_a_scenario(asked, tmp_path):
-    done = CliRunner().invoke(app, ["question", str(asked.path), str(LAST), "--out", str(tmp_path)])
-    assert done.exit_code == 0
-    assert (tmp_path / "drawn" / "4" / "question_3_4.scenario.yaml").exists()

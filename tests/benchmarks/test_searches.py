@@ -1,6 +1,5 @@
 """Searches and bisections of a study: what they find, that it can be made again, and what is said of it."""
 
-import json
 from dataclasses import replace
 from math import inf, isfinite, nan
 from pathlib import Path
@@ -9,10 +8,8 @@ import numpy as np
 import pytest
 import typer
 import yaml
-from typer.testing import CliRunner
 
 import coop_drake
-from benchmarks.app import app
 from benchmarks.campaigns import __main__ as campaigns
 from benchmarks.searches.departures import BoundedDepartures, departures_at, largest_multiple, multiplied
 from benchmarks.searches.findings import (
@@ -22,7 +19,7 @@ from benchmarks.searches.findings import (
     multiple_shown,
     summarise_searches,
 )
-from benchmarks.searches.searching import Searching, first_lost, margin_of, search_batches, search_worst
+from benchmarks.searches.searching import Searching, first_lost, search_worst
 from benchmarks.study import Results, load_study, make_study
 from coop_drake.campaign import load_campaign
 from coop_drake.campaign.plans import Plans
@@ -34,7 +31,6 @@ from coop_drake.plant import planning_problem
 from coop_drake.plant.facts import budget_of
 from coop_drake.scenario.budget_file import wave_bounds
 from coop_drake.scenario.deployment import Wave, Waves
-from tests.support.cli import invoke
 from tests.support.scenarios import write_scenario
 
 ASKED = {"set": {"deployment.preset": "mobile_base"}, "budget": "all", "scenarios": ["room.scenario.yaml"]}
@@ -165,12 +161,6 @@ def test_the_lost_run_with_the_smallest_margin_is_the_worst_of_its_generation():
     assert found.record.funnel_margin == min(found.margins[1:])
 
 
-def test_a_margin_that_a_run_does_not_tell_is_larger_than_any_other():
-    assert margin_of(record(2e-3), "funnel_margin") == 2e-3
-    assert margin_of(record(2e-3, budget_share=0.7), "budget_share") == pytest.approx(0.3)
-    assert margin_of(record(nan), "funnel_margin") == margin_of(record(2e-3), "budget_share") == inf
-
-
 @pytest.mark.parametrize("edge", [0.3, 1.0, 1.7, 11.3])
 def test_bisection_encloses_the_multiple_at_which_runs_are_lost(edge):
     tried = []
@@ -229,19 +219,6 @@ def test_a_search_is_made_once_and_its_worst_run_is_found_again_to_the_last_bit(
 
 
 @pytest.mark.slow
-def test_what_a_search_finds_by_the_compiled_loop_is_replayed_by_both_loops(study, tmp_path):
-    asked = replace(study, searches=replace(study.searches, tier="compiled"), breaking=None)
-    finding = Searching(asked, CampaignFolder(tmp_path), "search", 0).record(0)
-    file = tmp_path / finding.file
-    assert load_campaign(file).runs.tier == "compiled"
-    result = invoke("campaign", "replay", file, 0, "--out", tmp_path, "--no-figures", "--json")
-    assert result.exit_code == 0, result.stderr
-    drake, compiled = json.loads(result.stdout)["tiers"]["funnel_margin"]
-    assert compiled == finding.worst
-    assert drake == pytest.approx(compiled, abs=5e-4)
-
-
-@pytest.mark.slow
 def test_a_breaking_point_is_where_the_first_run_is_lost(study, searched, monkeypatch):
     def record(maker, run):
         size = run.values[f"{WAVES}.angle.size"]
@@ -262,33 +239,6 @@ def test_a_breaking_point_is_where_the_first_run_is_lost(study, searched, monkey
     batches = list(searching.batches())
     folder.write(batches[1], [model])
     assert folder.records(batches, BreakingPoint).to_pylist() == [vars(model)]
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("kept", "code"), [(2.0, 0), (0.5, 1)])
-def test_a_loss_inside_what_is_certified_makes_the_command_fail(study, tmp_path, kept, code):
-    file = study.path.with_name("breaking.study.yaml")
-    file.write_text(yaml.safe_dump({"breaking": {**BROKEN, "departures": ["angles"]}}))
-    folder = CampaignFolder(tmp_path)
-    (batch,) = search_batches(load_study(file), folder)
-    folder.write(batch, [BreakingPoint("room", "drake", "angles", 0.0015, kept, kept + 0.1, 2, "left")])
-    result = CliRunner().invoke(app, ["study", str(file), "--out", str(tmp_path)])
-    assert (result.exit_code, result.stderr) == (code, "")
-    assert "angles" in result.stdout
-
-
-def test_further_searches_leave_the_results_of_earlier_ones_valid(study, tmp_path):
-    more = replace(study, searches=replace(study.searches, count=3), breaking=None)
-    folder = CampaignFolder(tmp_path)
-    before, after = (list(search_batches(one, folder)) for one in (study, more))
-    assert [(one.tier, one.first) for one in before] == [("search", 0), ("breaking", 0), ("breaking", 1)]
-    assert [(one.first, one.stop) for one in after] == [(0, 1), (1, 2), (2, 3)]
-    assert Searching(more, folder, "search", 0).begun(2).seed == 6
-    assert after[0].digest == before[0].digest
-    other = replace(more, searches=replace(more.searches, evaluations=3))
-    assert next(search_batches(other, folder)).digest != before[0].digest
-    larger = replace(more, searches=replace(more.searches, batch=2))
-    assert [(one.first, one.stop) for one in search_batches(larger, folder)] == [(0, 2), (2, 3)]
 
 
 @pytest.mark.parametrize(

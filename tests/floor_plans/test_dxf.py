@@ -8,8 +8,7 @@ from shapely import box, contains_xy
 
 from coop_drake.errors import FloorPlanError
 from coop_drake.floor_plans import FloorPlanSettings, read_floor_plan
-from tests.support.floor_plan_files import write_dxf
-from tests.support.mutants.floor_plans import DXF
+from tests.support.floor_plan_files import DXF, write_dxf
 
 HALL = [(0, 0), (10_000, 0), (10_000, 6_000), (0, 6_000)]
 

@@ -11,6 +11,14 @@ from PIL import Image
 
 INKSCAPE = 'xmlns:inkscape="http://www.inkscape.org/namespaces/inkscape"'
 XLINK = 'xmlns:xlink="http://www.w3.org/1999/xlink"'
+DXF = (
+    b"0 SECTION 2 HEADER 9 $ACADVER 1 AC1009 9 $INSUNITS 70 4 0 ENDSEC 0 SECTION 2 ENTITIES "
+    b"0 LINE 8 walls 10 0 20 0 11 9000 21 0 0 LINE 8 walls 10 9000 20 0 11 9000 21 6000 "
+    b"0 LINE 8 walls 10 9000 20 6000 11 0 21 6000 0 LINE 8 walls 10 0 20 6000 11 0 21 0 "
+    b"0 CIRCLE 8 walls 10 3000 20 3000 40 500 "
+    b"0 ARC 8 walls 10 6000 20 0 40 700 50 0 51 180 0 ENDSEC 0 EOF "
+).replace(b" ", b"\n")
+"""A hall in millimetres, with a column and an alcove: lines of codes and of values."""
 HALL = '<path d="M 0,0 H 10 V 6 H 0 Z"/>'
 
 

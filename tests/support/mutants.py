@@ -1,0 +1,375 @@
+"""Files that are malformed by construction: what was done to a sound one, and what a message must name."""
+
+from __future__ import annotations
+
+import copy
+import io
+import itertools
+import json
+import math
+import random
+import re
+from collections import defaultdict
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from itertools import islice, zip_longest
+from typing import Any
+from xml.etree import ElementTree
+
+import numpy as np
+
+from coop_drake.answers.digest import content_digest
+
+Place = tuple[Any, ...]
+NO_TEXT = (b"\xff", b"\xc3\x28", b"\xe2\x82", b"\xed\xa0\x80", b"\x80", b"\x00", b"\x1b")
+"""Bytes that no text in UTF-8 holds, and control characters."""
+
+
+@dataclass(frozen=True)
+class Mutant:
+    """A malformed file; the key is empty where the text itself is broken."""
+
+    kind: str
+    content: bytes
+    key: str = ""
+
+
+class Raw(str):
+    """Text that goes into a file as it is."""
+
+
+def flow(value: Any) -> str:
+    """Plain data as one line of YAML; ``_tag`` becomes a tag."""
+    if isinstance(value, Raw):
+        return str(value)
+    if isinstance(value, dict):
+        pairs = (f"{json.dumps(key)}: {flow(one)}" for key, one in value.items() if key != "_tag")
+        return f"{value.get('_tag', '')} {{{', '.join(pairs)}}}".strip()
+    if isinstance(value, list | tuple):
+        return "[" + ", ".join(map(flow, value)) + "]"
+    if isinstance(value, float) and not math.isfinite(value):
+        return ".nan" if math.isnan(value) else ".inf" if value > 0.0 else "-.inf"
+    return json.dumps(value)
+
+
+def block(data: dict[str, Any]) -> str:
+    """A whole file of YAML, one line for each section."""
+    return "".join(f"{key}: {flow(value)}\n" for key, value in data.items())
+
+
+def in_yaml(data: dict[str, Any]) -> bytes:
+    return block(data).encode()
+
+
+def in_json(data: Any) -> bytes:
+    return json.dumps(data).encode()
+
+
+def signed(document: dict[str, Any]) -> bytes:
+    """In JSON with a digest of its own, which would not betray what was altered."""
+    return in_json({**document, "digest": content_digest(document)} if "digest" in document else document)
+
+
+def at(data: Any, path: Place) -> Any:
+    """What stands at a place."""
+    for step in path:
+        data = data[step]
+    return data
+
+
+def put(data: Any, path: Place, value: Any) -> Any:
+    """A copy with something else at a place, or something new; what is beside the way there is shared."""
+    if not path:
+        return value
+    result = copy.copy(data)
+    result[path[0]] = put(data[path[0]], path[1:], value) if len(path) > 1 else value
+    return result
+
+
+def without(data: Any, path: Place) -> Any:
+    """A copy that lacks an entry."""
+    return put(data, path[:-1], {k: one for k, one in at(data, path[:-1]).items() if k != path[-1]})
+
+
+def dotted(path: Sequence[Any]) -> str:
+    """A place as messages name it: ``start.joints.robot_0[1]``."""
+    return "".join(f"[{step}]" if isinstance(step, int) else f".{step}" for step in path).removeprefix(".")
+
+
+def sampled(mutants: Iterable[Mutant], count: int, seed: int) -> list[Mutant]:
+    """So many mutants at most, of every kind as many as of the others if there are enough."""
+    rng, kinds = random.Random(seed), defaultdict[str, list[Mutant]](list)
+    for mutant in mutants:
+        kinds[mutant.kind.partition(" at ")[0]].append(mutant)
+    for members in kinds.values():
+        rng.shuffle(members)
+    rounds = zip_longest(*kinds.values())
+    return list(islice((mutant for row in rounds for mutant in row if mutant is not None), count))
+
+
+def leaves(data: Any, path: Place = ()) -> Iterator[tuple[Place, Any]]:
+    """Every value with its place, mappings and lists before what is in them."""
+    yield path, data
+    pairs = data.items() if isinstance(data, dict) else enumerate(data) if isinstance(data, list) else ()
+    for step, value in pairs:
+        yield from leaves(value, (*path, step))
+
+
+WRONG: tuple[tuple[type | tuple[type, ...], tuple[Any, ...]], ...] = (
+    (bool, ("maybe", 3, [True])),
+    ((int, float), ("wide", True, [1.0], {"metres": 1.0}, math.nan, math.inf, -math.inf)),
+    (str, (3, False, ["text"], {"text": 1})),
+    (list, ("wide", 3.0, {"0": 1})),
+    (dict, ("wide", 3.0, [1])),
+)
+"""Values of other types, by the type of what they stand for."""
+
+
+def typed_mutants(data: dict[str, Any], write=in_yaml, *, skip=(), required=False) -> Iterator[Mutant]:
+    """Values of another type, unknown keys and, where all are required, missing ones, at every place.
+
+    Args:
+        data: A sound document.
+        write: Turns a document into a file.
+        skip: Keys below which nothing is changed.
+        required: Whether every key is.
+    """
+    for place, value in leaves(data):
+        if any(step in skip for step in place) or "_tag" in place:
+            continue
+        if isinstance(value, dict):
+            unknown = (*place, "colour")
+            yield Mutant(f"unknown key at {unknown}", write(put(data, unknown, "red")), dotted(unknown))
+            for name in value if required else ():
+                if name not in skip:
+                    here = (*place, name)
+                    yield Mutant(f"missing key at {here}", write(without(data, here)), dotted(here))
+        if place and value is not None:
+            others = next(others for kind, others in WRONG if isinstance(value, kind))
+            for other in others:
+                kind = f"{other} for {type(value).__name__} at {dotted(place)}"
+                yield Mutant(kind, write(put(data, place, other)), dotted(place))
+
+
+def broken_text(
+    content: bytes, count: int, seed: int, key: str = "", end: int | None = None
+) -> Iterator[Mutant]:
+    """Files that are cut off before an end, and with bytes between that are no text."""
+    rng = random.Random(seed)
+    for place in rng.sample(range(1, len(content) if end is None else end), count):
+        yield Mutant(f"cut off at {place}", content[:place], key)
+    for number in range(count):
+        place, junk = rng.randrange(len(content) + 1), NO_TEXT[number % len(NO_TEXT)]
+        yield Mutant(f"{junk!r} at {place}", content[:place] + junk + b" " + content[place:])
+    for name in ("utf-16", "utf-32"):
+        yield Mutant(f"as {name}", content.decode().encode(name))
+    yield Mutant("a picture", b"\x89PNG\r\n\x1a\n" + bytes(range(256)))
+    yield Mutant("empty", b"", key)
+
+
+def yaml_mutants(data: dict[str, Any], seed: int) -> Iterator[Mutant]:
+    """Broken YAML of a scenario, and YAML without end: repeated keys, code, nesting, aliases of aliases."""
+    text = block(data)
+    yield from broken_text(text.encode(), 50, seed, end=text.index("goal:"))
+    for kind, content in (
+        ("a repeated key", text + '"goal": 3\n'),
+        ("two documents", text + "---\n" + text),
+        ("tabs", text.replace("goal: ", "goal:\n\t")),
+        ("an open bracket", text + "planner: {margin: 0.1\n"),
+        ("a bracket too many", text + "planner: {margin: 0.1}}\n"),
+        ("an open quote", text + 'planner: {strategy: "cells}\n'),
+        ("a key without a colon", text + "planner\n"),
+        ("an object of Python", text + "planner: !!python/object/apply:os.getcwd []\n"),
+        ("a key of Python", text + "!!python/name:os.system planner: {}\n"),
+        ("an unknown tag", text.replace("goal: ", "goal: !Target ")),
+        ("an alias of nothing", text + "planner: *settings\n"),
+        ("a merge of nothing", text + "planner: {<<: 3}\n"),
+        ("a mapping as a key", text + "{a: 1}: {margin: 0.1}\n"),
+        ("a date as a number", text + "planner: {margin: 2024-02-30}\n"),
+        ("no binary", text + "planner: !!binary '*'\n"),
+        ("a set", text + "planner: !!set {margin}\n"),
+        ("a directive", "%YAML 9.9\n---\n" + text + "plan: 1\n"),
+        *((f"{depth} lists", text + f"planner: {'[' * depth}{']' * depth}\n") for depth in (100, 200_000)),
+        *(
+            (f"{depth} maps", text + "planner: " + "{a: " * depth + "1" + "}" * depth)
+            for depth in (100, 20_000)
+        ),
+        ("900 indented mappings", text + "plan:\n" + "".join(f"{' ' * k}a:\n" for k in range(1, 900))),
+        *(
+            ("it holds itself", text + f"planner: {own}\n")
+            for own in ("&a [*a]", "&a {a: *a}", "&a {<<: *a}")
+        ),
+    ):
+        yield Mutant(kind, content.encode())
+    names = "abcdefghijklmnopqrst"
+    for first, many in (("[0]", "[{}]"), ("{x: 1}", "{{k: [{}]}}"), ("{x: 1}", "{{<<: [{}]}}")):
+        bomb = f"_a: &a {first}\n"
+        for one, other in itertools.pairwise(names):
+            bomb += f"_{other}: &{other} {many.format(', '.join([f'*{one}'] * 9))}\n"
+        yield Mutant(f"bomb of {many}", (bomb + text).encode())
+        used = bomb + text.replace("goal: ", "planner: {margin: *t}\ngoal: ")
+        yield Mutant(f"bomb of {many} as a number", used.encode())
+
+
+def model_mutants(content: bytes, key: str, seed: int, count: int) -> list[Mutant]:
+    """Robot models of broken XML, with elements and attributes misspelt, and with values that are none."""
+    text, found = content.decode(), []
+    named = text.replace('name="base"', 'name="&j;"', 1)
+    bomb = "".join(f'<!ENTITY {b} "{f"&{a};" * 10}">' for a, b in itertools.pairwise("abcdefghij"))
+    nested = "<model name='a'>" * 20_000 + "</model>" * 20_000
+    for kind, changed in (
+        ("another root", "<html><body/></html>"),
+        ("two roots", text + "<sdf version='1.9'/>"),
+        ("an attribute twice", text.replace('name="base"', 'name="base" name="base"', 1)),
+        ("a bare ampersand", text.replace('name="base"', 'name="base & co"', 1)),
+        ("entities of entities", f'<!DOCTYPE m [<!ENTITY a "base">{bomb}]>' + named.partition("?>")[2]),
+        ("a file as an entity", '<!DOCTYPE m [<!ENTITY j SYSTEM "file:///etc/hostname">]>' + named),
+        ("20000 elements in each other", f"<sdf version='1.9'>{nested}</sdf>"),
+        ("a prefix of nothing", text.replace("<link", "<x:link", 1).replace("</link", "</x:link", 1)),
+    ):
+        found.append(Mutant(kind, changed.encode(), key))
+    begin = text.find("?>") + 3
+    found += [
+        Mutant("cut off", content[:place], key)
+        for place in random.Random(seed).sample(range(begin, text.rindex("</")), 20)
+    ]
+    return found + sampled(_of_elements(content, key), count, seed)
+
+
+def _of_elements(content: bytes, key: str) -> Iterator[Mutant]:
+    root = ElementTree.fromstring(content)
+    for place, element in enumerate(root.iter()):
+
+        def changed(kind: str, change, place=place, element=element) -> Mutant:
+            tree = copy.deepcopy(root)
+            change(list(tree.iter())[place])
+            return Mutant(f"{kind} at {element.tag} {place}", ElementTree.tostring(tree), key)
+
+        yield changed("misspelt element", lambda one: setattr(one, "tag", f"{one.tag}_"))
+        for name in element.attrib:
+            yield changed(
+                "misspelt attribute", lambda one, name=name: one.set(f"{name}_", one.attrib.pop(name))
+            )
+        for name, value in {None: (element.text or "").strip(), **element.attrib}.items():
+            if name in ("version", "name") or not re.fullmatch(r"[-+0-9.eE ]+", value):
+                continue
+            parts, field = value.split(), name or element.tag
+            limit = field in ("lower", "upper", "effort", "velocity")
+            wrong = [" ".join([bad, *parts[1:]]) for bad in ("wide", "nan", "0.1.2", "1m", "0xzz")]
+            wrong += [] if limit else [" ".join([bad, *parts[1:]]) for bad in ("inf", "1e400")]
+            if len(parts) > 1:
+                wrong += [f"{value} 7", *([] if field == "diffuse" else [" ".join(parts[:-1])])]
+            for bad in wrong:
+                yield changed(
+                    f"{bad.split()[0] if len(bad.split()) == len(parts) else 'a length'} for a number",
+                    lambda one, name=name, bad=bad: one.set(name, bad) if name else setattr(one, "text", bad),
+                )
+
+
+def json_mutants(document: dict[str, Any], seed: int) -> Iterator[Mutant]:
+    """Broken JSON, JSON of something else, and heads of other files."""
+    text = json.dumps(document)
+    yield from broken_text(text.encode(), 20, seed)
+    for kind, content in (
+        ("a list", "[]"),
+        ("nothing", "null"),
+        ("an empty mapping", "{}"),
+        ("two documents", text + text),
+        ("single quotes", text.replace('"', "'")),
+        ("a comment", text[:-1] + "// done\n}"),
+        ("a repeated key", text[:-1] + f', "{next(iter(document))}": 1}}'),
+        ("YAML", "format: coop_drake plan\n"),
+        ("100000 lists", "[" * 100_000 + "]" * 100_000),
+        ("100000 mappings", '{"a":' * 100_000 + "1" + "}" * 100_000),
+        ("a number without end", text[:-1] + ', "colour": ' + "9" * 5_000 + "}"),
+    ):
+        yield Mutant(f"{kind} as a file", content.encode())
+    for name, values in (("format", ("coop_drake plan 2", "", "plan")), ("version", (0, 1.5, 99, "2", -1))):
+        for value in values:
+            yield Mutant(f"another {name}", signed({**document, name: value}), name)
+
+
+def unsigned_mutants(document: dict[str, Any], seed: int) -> Iterator[Mutant]:
+    """Digests of something else, and numbers changed by hand under the digest of others."""
+    for digest in ("", "0" * 64, document["digest"].upper()):
+        yield Mutant("another digest", in_json({**document, "digest": digest}), "digest")
+    numbers = [place for place, value in leaves(document) if type(value) is float]
+    for place in random.Random(seed).sample(numbers, 20):
+        changed = in_json(put(document, place, at(document, place) + 1e-6))
+        yield Mutant(f"a number changed by hand at {place}", changed)
+
+
+def polygon_mutants(document: dict[str, Any]) -> Iterator[Mutant]:
+    """Rings that enclose nothing or meet themselves, and holes that take nothing or all away."""
+    for place, value in leaves(document):
+        if not isinstance(value, dict) or "outer" not in value:
+            continue
+        ring = value["outer"]
+        (x, y), (a, b) = ring[:2]
+        far = [[x + 1e4, y], [x + 1e4 + 1.0, y], [x + 1e4, y + 1.0]]
+        for kind, changes in (
+            ("no corners", {"outer": []}),
+            ("two corners", {"outer": ring[:2]}),
+            ("corners in a line", {"outer": [ring[0], [0.5 * (x + a), 0.5 * (y + b)], ring[1]]}),
+            ("a spike", {"outer": [ring[0], [x + 0.3, y + 0.4], *ring]}),
+            ("a bow tie", {"outer": [[0.0, 0.0], [1.0, 1.0], [1.0, 0.0], [0.0, 1.0]]}),
+            ("a corner of three", {"outer": [[*ring[0], 0.0], *ring[1:]]}),
+            ("a hole outside", {"holes": [far]}),
+            ("a hole as large as all", {"holes": [ring]}),
+        ):
+            yield Mutant(
+                f"{kind} at {place}", signed(put(document, place, {**value, **changes})), dotted(place)
+            )
+
+
+def plan_mutants(document: dict[str, Any]) -> Iterator[Mutant]:
+    """Plans that cannot be executed, or that answer another question; of the length that others have."""
+
+    def changed(place: Place, value: Any, key: Place | None = None) -> Mutant:
+        return Mutant(
+            f"another {place[-1]}", signed(put(document, place, value)), dotted(place if key is None else key)
+        )
+
+    for k, (cell, transition) in enumerate(zip(document["cells"], document["transitions"], strict=True)):
+        own, here = ("cells", k), ("transitions", k)
+        far = [[x + 50.0, y] for x, y in cell["tidied"]["outer"]]
+        yield changed((*own, "tidied", "outer"), far, ("transitions", k - 1, "target") if k else ("start",))
+        yield changed((*own, "lower"), cell["upper"], (*own, "upper"))
+        yield changed((*own, "lower"), cell["lower"][:-1], own)
+        yield changed((*here, "target"), [transition["target"][0] + 50.0, transition["target"][1]])
+        yield changed((*here, "goal_lower"), [value - 9.0 for value in transition["goal_lower"]], here)
+        yield changed((*here, "gains", "funnel"), "square")
+        yield changed((*here, "gains", "stiffness"), 0.0)
+        yield changed((*here, "inradius"), -1.0)
+    for name in ("start", "goal_pose"):
+        for index, value in enumerate(document[name]):
+            yield changed((name,), put(document[name], (index,), value + 20.0))
+        yield changed((name,), document[name][:-1])
+    yield changed(("joint_names",), [f"{name}_b" for name in document["joint_names"]])
+    yield changed(("problem",), "0" * 64)
+    yield changed(("goal_joints",), [1.0, *document["goal_joints"][1:]])
+
+
+def log_mutants(content: bytes, seed: int) -> Iterator[Mutant]:
+    """Malformed copies of a sound ``.npz`` file."""
+
+    def archive(arrays: dict[str, np.ndarray]) -> bytes:
+        stream = io.BytesIO()
+        np.savez_compressed(stream, **arrays)
+        return stream.getvalue()
+
+    for place in random.Random(seed).sample(range(len(content) - 22), 20):
+        yield Mutant(f"cut off at {place}", content[:place])
+    yield Mutant("text", b"times: [0, 1]\n")
+    yield Mutant("an empty archive", archive({}), "times")
+    with np.load(io.BytesIO(content)) as read:
+        arrays = {name: read[name] for name in read.files}
+    for name, array in arrays.items():
+        rest = {key: value for key, value in arrays.items() if key != name}
+        yield Mutant(f"missing {name}", archive(rest), name)
+        yield Mutant(f"misspelt {name}", archive({**rest, f"{name}_": array}), name)
+        if array.dtype.kind in "fi":
+            yield Mutant(f"words in {name}", archive({**rest, name: np.full(array.shape, "wide")}), name)
+            yield Mutant(f"{name} of four axes", archive({**rest, name: array.reshape(-1, 1, 1, 1)}), name)
+            if name != "times":
+                yield Mutant(f"a row too few in {name}", archive({**rest, name: array[:-1]}), name)
