@@ -14,13 +14,13 @@ from pathlib import Path
 
 import pytest
 
-from coop_drake.campaign.execution import Order, make_batch, make_batches
+from coop_drake.campaign.execution import Order, _locked, make_batch, make_batches
 from coop_drake.campaign.file import load_campaign
 from coop_drake.campaign.plans import Plans
 from coop_drake.campaign.records import Batch, Batching, CampaignFolder, write_table
 from coop_drake.campaign.runs import RunMaker
 from coop_drake.campaign.variation import Variation
-from coop_drake.errors import CoopDrakeError
+from coop_drake.errors import CoopDrakeError, ScenarioError
 from tests.support.processes import kill, processes, waited_for
 from tests.support.scenarios import write_scenario
 
@@ -145,10 +145,6 @@ def test_a_campaign_that_is_disturbed_in_every_way_ends_as_one_that_is_not(undis
 
     first = begun(folder.path, "--workers", 1)
     worker = worker_of(folder)
-    beside = begun(folder.path)
-    _, said = beside.communicate(timeout=PATIENCE)
-    assert beside.returncode == 2
-    assert "a folder in which no other command works" in said
     kill(worker)
     waited_for(lambda: gone(worker))
     worker_of(folder, but=[worker])
@@ -214,6 +210,13 @@ def made(folder, batch):
     file.write_text("")
     options = {"workers": 1, "scheduler": None, "progress": None}
     return make_batches(file, folder, (batch,), lambda missing: None, lambda batch: 1.0, **options)
+
+
+def test_two_commands_do_not_work_in_one_folder(tmp_path):
+    folder, batch = fatal(tmp_path / "locked", 1)
+    with _locked(folder), pytest.raises(ScenarioError, match="a folder in which no other command works"):
+        made(folder, batch)
+    assert made(folder, batch).made == 1
 
 
 def test_pieces_that_hang_or_end_every_process_are_recorded_as_lost_and_the_others_are_made(
