@@ -19,7 +19,6 @@ from coop_drake.answers import load_plan
 from coop_drake.answers.log import SimulationLog
 from coop_drake.cli import run, simulate
 from coop_drake.cli.reporter import Reporter, reporting
-from coop_drake.cli.results import ResultFolder
 from coop_drake.cli.task import read_task
 from coop_drake.errors import PlanError
 from coop_drake.viz import LivePage
@@ -157,48 +156,6 @@ def test_a_plan_for_another_deployment_is_read_with_a_warning(finished, tmp_path
     assert ("make these 17.5 ms old; `coop-drake plan`" in shown.getvalue()) == warned
 
 
-def test_people_get_the_recording_before_the_figures_which_can_be_left_out(finished, room, tmp_path, drawn):
-    plan = finished[0] / "plan.json"
-    shown = invoke("simulate", room, "--plan", plan, "--out", tmp_path, "--no-figures").stdout
-    assert NoDrawings.order == ["none", "recording", "figures"]
-    assert (
-        shown.index("peak base force") < shown.index("The recording is") < shown.index("All results are in")
-    )
-
-
-def test_a_gap_too_narrow_is_infeasible_and_an_older_plan_does_not_stay(tmp_path):
-    outer = [
-        [0, 0],
-        [4, 0],
-        [4, 1.8],
-        [5, 1.8],
-        [5, 0],
-        [9, 0],
-        [9, 4],
-        [5, 4],
-        [5, 2.2],
-        [4, 2.2],
-        [4, 4],
-        [0, 4],
-    ]
-    path = write_scenario(
-        tmp_path / "gap.scenario.yaml",
-        workspace={"outer": outer},
-        start={"object": {"x": 2.0, "y": 2.0, "theta": 0.0}, "joints": ROOM["start"]["joints"]},
-        goal={"object": {"x": 7.0, "y": 2.0, "theta": 0.0}},
-    )
-    out = tmp_path / "out"
-    ResultFolder(out).begin("plan")
-    (out / "plan.json").write_text("of an older run")
-    result = invoke("plan", path, "--out", out, "--json")
-    assert result.exit_code == 3, result.stderr
-    facts = json.loads(result.stdout)
-    assert facts.keys() >= PLAN_KEYS
-    assert (facts["answer"], facts["cells"]) == ("infeasible", 0)
-    assert facts["reason"] in " ".join(result.stderr.split())
-    assert sorted(path.name for path in out.iterdir()) == [".coop_drake_results.json", "certificate.json"]
-
-
 def test_a_budget_that_ends_is_undecided(tmp_path, monkeypatch):
     sample_little(monkeypatch)
     text = (MODELS / "closed.scenario.yaml").read_text() + "\nplanner: {max_slices: 5}\n"
@@ -242,20 +199,6 @@ def test_a_live_run_is_looked_at_and_says_where_without_waiting_for_anybody(
     assert f"Live view: open {address}" in result.stderr
 
 
-def test_a_live_run_may_wait_for_a_browser_as_long_as_it_takes(finished, room, tmp_path, monkeypatch):
-    waited = []
-
-    def simulated(*_, observer, **__):
-        raise PlanError("far enough")
-
-    monkeypatch.setattr(simulation, "simulate", simulated)
-    monkeypatch.setattr(LivePage, "wait_for_viewer", lambda _, seconds: waited.append(seconds))
-    plan = finished[0] / "plan.json"
-    result = invoke("simulate", room, "--plan", plan, "--out", tmp_path / "live", "--wait", "--json")
-    assert waited == [inf]
-    assert "live_url" in json.loads(result.stdout)
-
-
 @pytest.mark.slow
 def test_warming_up_leaves_nothing_behind(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
@@ -265,17 +208,10 @@ def test_warming_up_leaves_nothing_behind(tmp_path, monkeypatch):
 
 
 MISTAKES = {
-    "a key that does not exist": ({"work_space": {}}, "work_space", "one of the keys"),
-    "a wrong type": ({"planner": {"margin": "wide"}}, "planner.margin", "'wide'"),
     "a start outside": (
         {"start": {"object": {"x": 0.1, "y": 2.0, "theta": 0.0}, "joints": ROOM["start"]["joints"]}},
         "start",
         "0.1",
-    ),
-    "an unknown model": (
-        {"directives": [{"add_model": {"name": "object", "file": "package://coop_drake_models/none.sdf"}}]},
-        "directives",
-        "none.sdf",
     ),
     "welds before models": ({"directives": ROOM["directives"][::-1]}, "directives", "robot_1"),
 }

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from coop_drake.answers.log import SimulationLog
+from coop_drake.errors import PlanError
 
 ROWS, ROBOTS, JOINTS = 5, 2, 3
 SIZES = {"N": ROBOTS, "n": JOINTS, "1 + n": 1 + JOINTS, "3 + n": 3 + JOINTS}
@@ -37,6 +38,17 @@ def test_a_log_survives_its_file_bit_by_bit(log, tmp_path):
     assert again.joint_names == log.joint_names
     assert again.robot_names == log.robot_names
     assert (again.plan_digest, again.scenario_digest) == ("1f", "2e")
+
+
+@pytest.mark.parametrize("lacking", ["times", "object_pose", "plan_digest"])
+def test_a_file_that_lacks_an_array_is_no_log_and_names_it(log, tmp_path, lacking):
+    path = tmp_path / "log.npz"
+    log.save(path)
+    with np.load(path) as archive:
+        arrays = {name: archive[name] for name in archive.files if name != lacking}
+    np.savez(path, **arrays)
+    with pytest.raises(PlanError, match=rf"log\.npz: not a simulation log; it lacks {lacking}; expected"):
+        SimulationLog.load(path)
 
 
 def test_a_violation_survives_its_file(log, tmp_path):

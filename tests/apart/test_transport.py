@@ -3,10 +3,8 @@
 import os
 import random
 import signal
-from contextlib import ExitStack
 from dataclasses import replace
 from multiprocessing import get_context
-from socket import create_connection
 from time import monotonic
 
 import msgspec
@@ -248,13 +246,6 @@ def test_who_gets_no_session_is_told_why(team, hello, words, reason):
     assert not team.world.present()
 
 
-def test_a_client_that_is_refused_says_why_and_asks_again(team):
-    robot = team.join(0, plan="another")
-    team.settle(lambda: team.world.refusals.total > 1, robot)
-    with pytest.raises(MessagingError, match=r"the world at .*: it has another plan"):
-        robot.open(0.2)
-
-
 def test_a_client_finds_a_server_that_starts_again_and_counts_anew(team):
     robot = team.connect(0)
     team.works_for(robot)
@@ -297,19 +288,6 @@ def test_malformed_messages_are_refused_counted_and_said_once_and_all_go_on(team
     assert team.refused(2 * len(bad) + 1) == {"SESSION": len(bad), "MALFORMED": len(bad) + 1}
     assert capfd.readouterr().err.count("the world refused a message, and goes on: ") == 1
     team.works_for(robot)
-
-
-def test_connections_that_do_not_speak_zeromq_do_no_harm(team):
-    robot, dice = team.connect(0), random.Random(1)
-    place = ("127.0.0.1", int(team.book.world.address.rpartition(":")[2]))
-    with ExitStack() as opened:
-        for number in range(60):
-            connection = opened.enter_context(create_connection(place))
-            if number % 3 == 0:  # The others stay silent.
-                connection.sendall(b"GET / HTTP/1.1\r\n\r\n" + dice.randbytes(200))
-        team.works_for(robot)
-    team.works_for(robot)
-    assert robot.sessions[msg.WORLD].count == 1
 
 
 def test_a_message_that_is_too_long_closes_its_connection(team):

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import pytest
 import yaml
 from typer.testing import CliRunner
@@ -112,14 +110,3 @@ def test_a_budget_without_a_file_is_refused_with_its_key(section, tmp_path):
         result = CliRunner().invoke(app, ["study", str(file), "--status", "--out", str(tmp_path / "out")])
     assert result.exit_code == 2
     assert f"{section}.budget: 'nowhere.yaml' is not allowed" in result.stderr
-
-
-def test_what_a_search_finds_names_the_budget_from_its_own_folder(tmp_path):
-    write_scenario(tmp_path / "room.scenario.yaml")
-    (tmp_path / "own.budget.yaml").write_text("{}")
-    asked = {"scenarios": ["room.scenario.yaml"], "budget": "own.budget.yaml"}
-    (tmp_path / "room.study.yaml").write_text(yaml.safe_dump({"searches": asked}))
-    trials = Searching(load_study(tmp_path / "room.study.yaml"), CampaignFolder(tmp_path), "search", 0).trials
-    found = load_campaign(trials.write_found({}, tmp_path / "found" / "room_0.campaign.yaml"))
-    assert found.runs.budget == "../own.budget.yaml"
-    assert Path(Variation(found).budget).resolve() == (tmp_path / "own.budget.yaml").resolve()

@@ -17,7 +17,6 @@ from tests.support.cli import invoke
 from tests.support.scenarios import write_scenario
 
 ROOM = {"scenarios": ["room.scenario.yaml"]}
-CERTIFIED = {**ROOM, "set": {"deployment.preset": "mobile_base"}, "budget": "all", "tier": "compiled"}
 
 
 def file_of(folder, **sections):
@@ -83,12 +82,6 @@ def test_a_start_in_the_wall_is_a_lost_run_and_not_refused(tier, tmp_path):
     assert record.reason
 
 
-def test_searches_and_bisections_of_what_a_loop_does_not_know_are_refused(tmp_path):
-    section = {**CERTIFIED, "set": {"deployment.preset": "mobile_base", "control.observer": True}}
-    for name in ("searches", "breaking"):
-        assert "control.observer" in refused(tmp_path, **{name: section})
-
-
 @pytest.mark.parametrize("name", ["searches", "breaking"])
 @pytest.mark.parametrize(
     ("key", "value"), [("bogus.key", 1), ("deployment.preset", "no_such"), ("deployment.mass_eror", 0.1)]
@@ -98,20 +91,6 @@ def test_a_wrong_key_or_value_of_set_is_named_with_its_section(name, key, value,
     assert "room.campaign.yaml" in said
     assert f"{name}." in said
     assert key in said
-
-
-def test_a_factor_beyond_what_the_model_may_err_is_refused(tmp_path):
-    said = refused(tmp_path, searches={**CERTIFIED, "factor": 6.0})
-    assert "searches.factor: '6' is not allowed" in said
-    assert "model_error" in said
-    assert "mass_error" in refused(tmp_path, searches={**CERTIFIED, "factor": 4.9})
-
-
-def test_a_budget_with_more_than_can_be_simulated_has_no_breaking_points(tmp_path):
-    (tmp_path / "own.budget.yaml").write_text("{axes: false, report_age: 11.0}")
-    without_limit = {**CERTIFIED["set"], "deployment.actuators.base_force": None}
-    section = {**CERTIFIED, "set": without_limit, "budget": "own.budget.yaml"}
-    assert "breaking.budget: " in refused(tmp_path, breaking=section)
 
 
 @pytest.mark.parametrize("name", ["questions", "searches", "breaking"])
@@ -175,14 +154,6 @@ def test_keys_around_one_another_are_refused(section, key, tmp_path):
     said = refused(tmp_path, "status", runs={**ROOM, "count": 1, **section})
     assert key in said
     assert "overwrite" in said
-
-
-def test_names_that_come_twice_are_refused(tmp_path):
-    twice = {"scenarios": 2 * ROOM["scenarios"]}
-    assert "searches.scenarios: " in refused(tmp_path, "status", searches=twice)
-    assert "breaking.scenarios: " in refused(tmp_path, "status", breaking=twice)
-    departures = {**ROOM, "departures": ["lag", "lag"]}
-    assert "breaking.departures: " in refused(tmp_path, "status", breaking=departures)
 
 
 def test_a_section_that_is_set_may_vary_in_parts(tmp_path):

@@ -105,16 +105,6 @@ def test_a_run_that_used_more_than_the_budget_states_is_told_first():
     assert verdict(make_report("lost", run_table(60, lost=(3,)))) == "bad"
 
 
-def test_a_tier_without_a_column_leaves_it_empty():
-    table = run_table(30)
-    empty = pa.array([float("nan")] * 30)
-    for name in ("wall_clearance", "body_clearance"):
-        table = table.set_column(table.schema.get_field_index(name), name, empty)
-    report = make_report("no clearance", table)
-    assert all("wall_clearance" not in group.measures for group in report.groups)
-    assert "nan" not in render_page(report, replay)
-
-
 class Links(HTMLParser):
     def __init__(self):
         super().__init__()

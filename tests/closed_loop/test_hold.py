@@ -17,7 +17,7 @@ from coop_drake.simulation.telemetry import Telemetry
 from tests.support.run_checks import verified_run
 from tests.support.small_loop import small_maps, small_problem
 
-MOMENTS = 100
+MOMENTS = 50
 REST_TIME = 1.6
 """Within this time after it was told so a team of base rests [s]."""
 
@@ -82,11 +82,11 @@ def test_at_random_moments_the_team_rests_without_contact_in_time(base):
         assert np.hypot(*(samples[-1].z - samples[0].z)[:2]) <= REST_DISTANCE
         assert samples[-1].cell == samples[1].cell
         cells.add(samples[-1].cell)
-    assert len(cells) > 20
+    assert len(cells) > 15
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("number", [9, 45, 83])
+@pytest.mark.parametrize("number", [4, 22, 41])
 def test_it_arrives_when_it_is_released(base, number):
     scenario, loop, invariants, contexts = base
     context = contexts[number].Clone()

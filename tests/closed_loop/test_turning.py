@@ -16,7 +16,6 @@ from coop_drake.plant.facts import budget_of
 from coop_drake.scenario import Deployment, Goal, ObjectPose, Start
 from coop_drake.simulation import build_maps, simulate
 from coop_drake.typed_data import convert_class
-from coop_drake.verification.budget import check_budget
 from coop_drake.verification.runs.budget import check_budget_used
 from coop_drake.verification.runs.rows import Rows
 from tests.support.small_loop import joint_names
@@ -87,25 +86,6 @@ def test_without_rate_terms_axes_come_nearer_to_their_bounds_than_stated():
     assert spared(plan, log).min() < -0.01
     with pytest.raises(RefusalError, match="nearer to a bound of its funnel than stated"):
         check_budget_used(Rows(log, plan))
-
-
-@pytest.mark.slow
-def test_the_plan_is_checked_with_the_bodies_of_its_team():
-    scenario, plan, _ = planned()
-    tree = planning_problem(scenario).tree
-    assert check_budget(plan, tree).tightest > 0.0
-    easily_turned = tuple((*body[:4], 0.1 * body[4], body[5]) for body in plan.budget.bodies)
-    for changes, where in (
-        ({"bodies": easily_turned}, "tolerance"),
-        ({"bodies": ((9, 1.0, 0.0, 0.0, 0.1, 0.0),)}, "budget.bodies"),
-        ({"rotors": (0.0,)}, "budget.rotors"),
-    ):
-        altered = replace(plan, budget=replace(plan.budget, **changes))
-        with pytest.raises(RefusalError) as refusal:
-            check_budget(altered, tree)
-        assert where in refusal.value.where
-    with pytest.raises(ValueError, match="expected the team"):
-        check_budget(plan)
 
 
 HALF_WIDTH = 0.03

@@ -15,7 +15,6 @@ from coop_drake.harmonic_maps import HarmonicMap, harmonic_map
 from coop_drake.harmonic_maps.pictures import sample_boundary
 from tests.support import domains
 from tests.support.domains import inside
-from tests.support.lightning import Lightning
 from tests.support.single_layer import SingleLayer
 
 # The harmonic map of a rectangle by separation of variables: exact up to the truncated series.
@@ -137,26 +136,6 @@ def test_rectangle_agrees_with_its_series():
     points = domains.inside(domain, 300, clearance=0.03)
     T, _ = HarmonicMap(domain, Point(1, 0.5))(points)
     np.testing.assert_allclose(T, rectangle_map(1.7, 0.9, points), atol=2e-9)
-
-
-@pytest.mark.parametrize(
-    "domain",
-    [
-        Polygon([(0, 0), (2, 0), (2, 1), (1, 1), (1, 2), (0, 2)]),
-        Polygon([(0, 0), (1, 0), (0.3, 0.8)]),
-        Polygon([(0, 0), (1, 0.1), (1.2, 0.9), (0.5, 0.6), (-0.1, 1)]),
-        box(0, 0, 2, 2).difference(box(0.7, 0.8, 1.2, 1.3)),
-    ],
-    ids=["ell", "triangle", "pentagon", "with a hole"],
-)
-def test_map_agrees_with_an_independent_solver(domain):
-    oracle = Lightning(domain, poles=40, degree=40)
-    harmonic_map = HarmonicMap(domain, domain.representative_point())
-    bound = harmonic_map.accuracy.error_estimate + 3 * oracle.residual
-    assert bound < 1e-5
-    points = domains.inside(domain, 200, clearance=0.01)
-    T, _ = harmonic_map(points)
-    assert np.hypot(*(T - oracle(points)).T).max() <= bound
 
 
 def test_outer_ring_goes_to_the_circle_linearly_in_arc_length(mapped):
@@ -430,13 +409,23 @@ def test_map_and_jacobian_agree_with_a_single_layer(name):
     assert np.linalg.norm(harmonic_map(deep)[1] - oracle.jacobian(deep), axis=(1, 2)).max() < slack
 
 
-def test_the_oracle_converges_to_the_map():
-    domain, goal = domains.u_corridor()
+@pytest.mark.parametrize(
+    "domain",
+    [
+        domains.u_corridor()[0],
+        Polygon([(0, 0), (1, 0), (0.3, 0.8)]),
+        Polygon([(0, 0), (1, 0.1), (1.2, 0.9), (0.5, 0.6), (-0.1, 1)]),
+        box(0, 0, 2, 2).difference(box(0.7, 0.8, 1.2, 1.3)),
+    ],
+    ids=["corridor", "triangle", "pentagon", "with a hole"],
+)
+def test_the_oracle_converges_to_the_map(domain):
     points = domains.inside(domain, 300, clearance=0.1)
-    T, _ = HarmonicMap(domain, goal, tolerance=1e-8)(points)
+    T, _ = HarmonicMap(domain, domain.representative_point(), tolerance=1e-8)(points)
     errors = [np.abs(SingleLayer(domain, elements=n)(points) - T).max() for n in (10, 30, 90)]
     assert errors[1] < errors[0] / 3.0
     assert errors[2] < errors[1] / 3.0
+    assert errors[2] < 1e-5
 
 
 @pytest.mark.parametrize("question", REAL_CELLS.values(), ids=REAL_CELLS)

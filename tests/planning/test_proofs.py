@@ -17,7 +17,7 @@ from coop_drake.planning.cells.exploration import Exploration, Verdict
 from coop_drake.planning.planner import plan
 from coop_drake.planning.proofs import MANY_CORNERS, Proofs, blocked_goal, clearance_bound, refuted_at_an_end
 from coop_drake.planning.questions import relaxed
-from coop_drake.planning.sampling.sampler import guiding_disc
+from coop_drake.planning.sampling.sampler import DISC_SHRINKAGE, DISC_TOLERANCE, guiding_disc
 from coop_drake.tree.component_tree import Body, Component, ComponentTree, ConvexShape, TreeJoint
 from coop_drake.tree.pose import PlanarPose
 from coop_drake.verification import verify_proof
@@ -83,16 +83,25 @@ def test_a_corridor_narrower_than_the_object_is_refuted_by_the_object_alone() ->
 
 
 @pytest.mark.parametrize("radius", [0.0, 0.1])
-@pytest.mark.parametrize("ring", [[(0, 0), (2, 0), (2, 1), (0, 1)], [(0, 0), (3, 0), (0, 1)], [(1, 1)]])
-def test_inscribed_discs_lie_inside(ring: list[tuple[float, float]], radius: float) -> None:
-    shape = ConvexShape(np.array(ring, dtype=float), radius)
-    disc = guiding_disc(shape)
-    if len(ring) < 3:
+@pytest.mark.parametrize(
+    ("corners", "inradius"),
+    [
+        ([(0, 0), (2, 0), (2, 1), (0, 1)], 0.5),
+        ([(0, 0), (3, 0), (0, 1)], 0.5 * (4.0 - np.sqrt(10.0))),
+        ([(1, 1)], 0.0),
+    ],
+)
+def test_guiding_discs_lie_inside_and_are_nearly_the_largest(corners, inradius, radius) -> None:
+    disc = guiding_disc(ConvexShape(np.array(corners, dtype=float), radius))
+    assert len(disc.vertices) == 1
+    if len(corners) < 3:
         assert disc.radius == radius
-    else:
-        hull = Polygon(ring).buffer(radius, quad_segs=64)
-        assert hull.buffer(1e-3).contains(Point(disc.vertices[0]).buffer(disc.radius))
-        assert disc.radius > 0.3 + radius
+        return
+    ring, centre = Polygon(corners), Point(disc.vertices[0])
+    room = ring.exterior.distance(centre)
+    assert ring.contains(centre)
+    assert inradius - DISC_TOLERANCE * ring.length <= room <= inradius + 1e-12
+    assert disc.radius == pytest.approx(DISC_SHRINKAGE * room + radius, rel=1e-12)
 
 
 def test_a_goal_in_collision_is_stated() -> None:

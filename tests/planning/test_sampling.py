@@ -18,6 +18,7 @@ from coop_drake.geometry.polygons import polygon_rings
 from coop_drake.geometry.sweeps import following, over_piece
 from coop_drake.geometry.swept_tree import BodyPairs, SweptTree
 from coop_drake.laws import ScheduledGains
+from coop_drake.planning import sampled_search
 from coop_drake.planning.boxes import PairSweeps, box_arrays, box_clearance, sweeps_apart, swept_piece
 from coop_drake.planning.cells.cells import CellMaker
 from coop_drake.planning.channel import Channel, Regions, middle_of
@@ -43,6 +44,7 @@ from coop_drake.planning.sampling.collision import (
     team_clearance,
 )
 from coop_drake.planning.sampling.narrow_passages import (
+    MITRE_LIMIT,
     amount_needed,
     are_free,
     body_contacts,
@@ -50,6 +52,7 @@ from coop_drake.planning.sampling.narrow_passages import (
     ease_less,
     repaired,
     wall_contacts,
+    widened_floor,
 )
 from coop_drake.planning.sampling.routes import MANY_CORNERS, disc_route, local_question
 from coop_drake.planning.sampling.sampler import Sampler, SubsystemHierarchy
@@ -429,6 +432,69 @@ def test_a_path_is_repaired_only_where_it_fits(corridor, fits):
     path, short = repaired(problem, tilted(), 0.06)
     assert (short <= 0.0) == fits
     assert are_free(problem, path).all() == fits
+
+
+def test_a_widened_floor_has_its_walls_moved_back_and_loses_thin_ones():
+    thick, thin = box(1.0, 1.0, 1.3, 2.0), box(2.0, 1.0, 2.15, 2.0)
+    found = widened_floor(box(0.0, 0.0, 4.0, 3.0).difference(thick | thin), 0.1)
+    wanted = box(-0.1, -0.1, 4.1, 3.1).difference(box(1.1, 1.1, 1.2, 1.9))
+    assert isinstance(found, MultiPolygon)
+    assert found.symmetric_difference(wanted).area == pytest.approx(0.0, abs=1e-12)
+    corner = widened_floor(Polygon([(0, 0), (8, 0), (0, 0.2)]), 0.1)  # Its mitre would be 8 m long.
+    assert corner.contains(box(0.0, 0.0, 0.1, 0.1))
+    assert corner.bounds[2] < 8.0 + 0.1 * (1.0 + MITRE_LIMIT)
+
+
+@pytest.mark.parametrize(
+    ("number", "object_first", "short", "steps"),
+    [
+        (0, True, 0.0, ["path"]),
+        (1, False, 0.0, ["direct_path"]),
+        (2, True, sampled_search.CENTRED_SHORT, ["direct", "path_around"]),
+        (2, True, 1.01 * sampled_search.CENTRED_SHORT, ["direct"]),
+    ],
+    ids=["first attempt", "later attempt", "object first", "object that does not fit"],
+)
+def test_paths_on_larger_floors_are_sampled_robot_by_robot_first_then_at_once_or_around_the_object(
+    monkeypatch, number, object_first, short, steps
+):
+    """Two seeds on three floors, the largest floor first; later attempts have other seeds."""
+    problem, asked, nothing = corridor_problem(0.9), [], np.empty((0, 5))
+
+    class Recorded:
+        def __init__(self, hierarchy, floor, gap, seed, progress):
+            self.steps, size = [], floor.area - problem.workspace.area
+            asked.append((seed, gap, size, self.steps))
+
+        def path(self, samples):
+            return self._step("path", samples)
+
+        def direct_path(self, samples):
+            return self._step("direct_path", samples)
+
+        def direct(self, robots, samples):
+            assert robots == ()
+            return sampled_search.GuidePath(self._step("direct", samples), ())
+
+        def path_around(self, guide, samples):
+            return self._step("path_around", samples)
+
+        def _step(self, name, samples):
+            assert samples == sampled_search.NARROW_SAMPLES
+            self.steps.append(name)
+            return nothing
+
+    monkeypatch.setattr(sampled_search, "Sampler", Recorded)
+    monkeypatch.setattr(sampled_search, "repaired", lambda question, path, growth: (path, short))
+    assert SampledSearch(problem).narrow_attempt(number, object_first=object_first) is None
+    seeds, gaps, sizes, made = map(list, zip(*asked, strict=True))
+    first = 2 * max(0, number - 1)
+    assert seeds == [first] * 3 + [first + 1] * 3
+    assert set(gaps) == {sampled_search.BODY_GAP}
+    grown = [widened_floor(problem.workspace, growth).area for growth in sampled_search.FLOOR_GROWTHS]
+    assert sizes == pytest.approx(2 * [area - problem.workspace.area for area in grown])
+    assert grown == sorted(grown, reverse=True)
+    assert made == 6 * [steps]
 
 
 @pytest.mark.slow

@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import ast
 import json
-from pathlib import Path
 
 import pytest
 import yaml
 from shapely import box
 
-import coop_drake.cli
 from coop_drake.answers.digest import problem_digest
 from coop_drake.cli.task import read_task
 from coop_drake.errors import FloorPlanError, ScenarioError
@@ -88,16 +85,3 @@ def test_every_command_that_reads_the_floor_repeats_the_notes_of_its_reader(tmp_
     made = invoke("new", "mine", *given, *poses, "--out", tmp_path / "mine", "--json")
     assert made.exit_code == 0, made.output
     assert json.loads(made.stdout)["notes"] == notes
-
-
-def test_all_commands_hand_their_reporter_to_the_reader():
-    sources = (Path(coop_drake.cli.__file__).parent).glob("*.py")
-    calls = [
-        node
-        for file in sources
-        for node in ast.walk(ast.parse(file.read_text()))
-        if isinstance(node, ast.Call) and getattr(node.func, "id", "") == "read_task"
-    ]
-    assert len(calls) >= 10
-    for call in calls:
-        assert len(call.args) == 3 or [word.arg for word in call.keywords] == ["reporter"], ast.unparse(call)

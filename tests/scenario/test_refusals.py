@@ -23,10 +23,6 @@ def corners(first):
     return CORNERS, f"{first}, [1.8, 0], [1.8, 3.6]"
 
 
-def section(text):
-    return "gains:", f"{text}\ngains:"
-
-
 def sets(text):
     return "the paper's", f"x\n  sets: {text}"
 
@@ -39,19 +35,13 @@ def sets(text):
         (("  joints:", "  joint:"), "start.joint", ..., "one of the keys object, joints"),
         (start("x: 0.9, y: 2, theta: 1.57, z: 1"), "start.object.z", 1, "one of the keys x, y, theta"),
         (start("x: 0.9, y: 2"), "start.object.theta", None, "this key is required"),
-        (start("x: left, y: 2, theta: 1"), "start.object.x", "left", "a finite number"),
         (start("x: yes, y: 2, theta: 1"), "start.object.x", True, "a finite number"),
-        (start("x: .nan, y: 2, theta: 1"), "start.object.x", ..., "a finite number"),
         (start("x: 1e300, y: 2, theta: 1"), "start.object.x", 1e300, "between -1e+06 and"),
         (start(f"x: {10**400}, y: 2, theta: 1"), "start.object.x", 10**400, "a number between"),
         ((POSE, "object: 3"), "start.object", 3, "a mapping with the keys x, y, theta"),
-        (section("planner: {max_slices: 1.5}"), "planner.max_slices", 1.5, "a whole"),
-        (("robot_0: [0.0]", "robot_0: zero"), "start.joints.robot_0", "zero", "a list"),
         (("robot_0: [0.0]", "1: [0.0]"), "start.joints.1", 1, "a text as the name"),
         (corners("[0, 0, 0]"), "workspace.outer[0]", [0, 0, 0], "a list of 2"),
-        (corners("[0, .nan]"), "workspace.outer[0][1]", ..., "a finite number"),
         (corners("[1.0e+12, 0]"), "workspace.outer[0][0]", 1e12, "between -1e+06 and"),
-        (corners("{x: 1.0}"), "workspace.outer[0]", {"x": 1.0}, "a list of 2"),
         (("selected: scheduled", "selected: fast"), "gains.selected", "fast", "one of scheduled, table_2"),
         (sets("{mine: !Gains {}}"), "gains.sets.mine", "!Gains", "one of !FixedGains, !ScheduledGains"),
         (sets("{scheduled: {age_phase: 0.5}}"), "gains.sets.scheduled", {"age_phase": 0.5}, "one of !Fixed"),

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import multiprocessing
-import sys
 import threading
 from dataclasses import replace
 from functools import cache
@@ -333,14 +332,6 @@ def test_what_makes_no_sense_is_refused_before_any_work(room, tmp_path, argument
     result = called(room, *arguments, "--out", tmp_path / "out")
     assert result.exit_code == 2
     assert complaint in " ".join(result.output.split())
-    assert not (tmp_path / "out").exists()
-
-
-def test_a_missing_optimizer_is_named_before_any_work(room, tmp_path, monkeypatch):
-    monkeypatch.setitem(sys.modules, "cma", None)
-    result = called(room, "--out", tmp_path / "out")
-    assert result.exit_code == 2
-    assert "pip install 'cma>=4.0'" in " ".join(result.output.split())
     assert not (tmp_path / "out").exists()
 
 

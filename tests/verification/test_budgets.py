@@ -1,12 +1,11 @@
 """A plan with a budget is accepted as the planner states it, and refused with any statement altered."""
 
-import copy
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from coop_drake.answers import load_plan, save_plan
+from coop_drake.answers import load_plan
 from coop_drake.errors import RefusalError
 from coop_drake.laws.axis_table import axis_table, bounds_of, track_row
 from coop_drake.verification import budget as checks
@@ -155,42 +154,6 @@ def with_transition(plan, k, **changes):
     return replace(plan, transitions=tuple(transitions))
 
 
-ALTERED = {
-    "entry_lower": 1.002, "entry_upper": -1.002, "entry_rate_lower": 0.9, "entry_rate_upper": 0.9,
-    "entry_acceleration": 0.9, "distance": 1.05, "acceleration": 0.95, "settled": 0.95,
-    "settled_rate": 0.95, "departure": 0.99, "rate_departure": 0.99, "alarm": 0.95, "ahead_alarm": 0.95,
-    "rate_alarm": 1.01,
-}  # fmt: skip
-
-
-@pytest.mark.parametrize("name", ALTERED)
-def test_an_altered_statement_is_refused(plan, name):
-    number, k = 0, len(plan.transitions) - 1  # the object's angle, which moves most
-    stated = plan.transitions[k].tolerance
-    statement = copy.deepcopy(getattr(stated, name))
-    values = statement[-1] if isinstance(statement, tuple) else statement
-    if name in ("entry_lower", "entry_upper"):
-        width = stated.entry_upper[number] - stated.entry_lower[number]
-        values[number] += width * 0.1 * np.sign(ALTERED[name])
-    else:
-        values[number] *= ALTERED[name]
-    with pytest.raises(RefusalError) as refusal:
-        check_budget(altered(plan, k, **{name: statement}))
-    assert refusal.value.where.startswith(f"transitions[{k}].tolerance.{name}[")
-    assert refusal.value.where.endswith(f"[{number}]")
-
-
-GAINS = {"position_gain": 0.3, "rate_gain": 2.5, "ramp_rate": 0.2, "saturation": 8.0}
-
-
-@pytest.mark.parametrize("name", GAINS)
-def test_other_gains_are_refused(plan, name):
-    gains = plan.transitions[0].gains
-    altered = with_transition(plan, 0, gains=replace(gains, **{name: GAINS[name] * getattr(gains, name)}))
-    with pytest.raises(RefusalError, match="tolerance"):
-        check_budget(altered)
-
-
 @pytest.mark.parametrize(
     ("name", "factor", "where"),
     [
@@ -224,59 +187,17 @@ def test_a_budget_without_sets_and_sets_without_a_budget_are_refused(plan):
         check_budget(position)
 
 
-@pytest.mark.parametrize(("name", "factor"), [("stiffness", 0.5), ("damping", 0.5), ("damping", 3.0)])
-def test_another_pull_is_refused(plan, name, factor):
-    tracking = plan.axis_tracking
-    altered = replace(tracking, **{name: factor * getattr(tracking, name)})
-    with pytest.raises(RefusalError, match=r"axis_tracking|departure"):
-        check_budget(replace(plan, axis_tracking=altered))
-
-
-def test_a_file_keeps_all_of_it(plan, tmp_path):
-    again = load_plan(save_plan(plan, tmp_path / "plan.json"))
-    assert again.budget == plan.budget
-    assert np.array_equal(again.transitions[0].tolerance.distance, plan.transitions[0].tolerance.distance)
-
-
-def test_a_budget_that_is_too_large_is_answered_with_one_that_holds(folder, tmp_path):
-    (tmp_path / "budget.yaml").write_text("{delay: 0.05, rate_noise: 0.3, angle_noise: 0.02}")
-    scenario = folder / "room.scenario.yaml"
-    result = invoke("plan", scenario, "--budget", tmp_path / "budget.yaml", "--out", tmp_path)
-    assert result.exit_code == 4, result.output
-    said = " ".join(result.output.split())
-    assert "No plan was found that holds under this budget. One holds under at most" in said
-    assert "% of it: control_rate 200, delay" in said
-    assert ". Under more, in transition" in said
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("text", "key"),
-    [
-        ("{delay: -1}", "delay"),
-        ("{dealy: 1}", "dealy"),
-        ("{model_error: 1.5}", "model_error"),
-        ("{bodies: [[9, 1, 0, 0, 1, 0]], rotors: []}", "bodies"),
-        ("{bodies: [[0, 1, 0, 0, 1]]}", "component, mass, x, y, inertia, robot"),
-        ("{bodies: [[0, 1, 0, 0, 1, 0]]}", "the team's"),
-        ("{rotors: [1, 1]}", "rotors"),
-        ("{base_force: 50}", "null without axes, bodies and the base of every robot"),
-    ],
-)
-def test_bad_budgets_are_bad_input(folder, tmp_path, text, key):
-    (tmp_path / "budget.yaml").write_text(text)
-    result = invoke("plan", folder / "room.scenario.yaml", "--budget", tmp_path / "budget.yaml")
-    assert result.exit_code == 2
-    assert key in result.output
-    assert invoke("plan", folder / "room.scenario.yaml", "--budget", tmp_path / "none.yaml").exit_code == 2
-
-
-def test_budgets_need_a_control_rate_and_scheduled_gains(folder):
-    scenario = folder / "room.scenario.yaml"
-    ideal = invoke("plan", scenario, "--budget", "all")
-    assert (ideal.exit_code, "control_rate" in ideal.output) == (2, True)
-    fixed = invoke("plan", scenario, "--budget", folder / "budget.yaml", "--gains", "table_2")
-    assert (fixed.exit_code, "scheduled gains" in " ".join(fixed.output.split())) == (2, True)
+def test_bad_budgets_are_bad_input(folder, tmp_path):
+    for name, text, key in (
+        ("budget.yaml", "{dealy: 1}", "dealy"),
+        ("budget.yaml", "{bodies: [[0, 1, 0, 0, 1]]}", "component, mass, x, y, inertia, robot"),
+        ("budget.yaml", "{bodies: [[0, 1, 0, 0, 1, 0]]}", "the team's"),
+        ("budget.yaml", "{base_force: 50}", "null without axes, bodies and the base of every robot"),
+        ("none.yaml", "", "none.yaml"),
+    ):
+        (tmp_path / "budget.yaml").write_text(text)
+        result = invoke("plan", folder / "room.scenario.yaml", "--budget", tmp_path / name)
+        assert (result.exit_code, key in result.output) == (2, True)
 
 
 def test_what_a_cell_misses_is_held_against_the_room_of_the_next_one(plan, monkeypatch):

@@ -59,16 +59,6 @@ def test_team_cell_forces_and_trail_follow_the_run(shown):
     assert meshcat.HasPath("/motion/trail/00000")
 
 
-def test_a_cell_is_touched_when_it_changes_only(shown):
-    view, meshcat = shown
-    view(sample(0.0, 0.9, 1, 0.0))
-    meshcat.SetProperty("/plan/cells/001", "visible", False)  # as who watches may do
-    view(sample(0.1, 0.9, 1, 0.0))
-    assert not visible(meshcat, "/plan/cells/001")
-    view(sample(0.2, 0.9, 2, 0.0))
-    assert visible(meshcat, "/plan/cells/002")
-
-
 def test_steps_just_after_a_frame_are_left_out_but_the_last_one_is_shown(shown):
     view, meshcat = shown
     view(sample(0.0, 0.9, 0, 0.0))
@@ -87,10 +77,6 @@ def test_a_run_that_is_ahead_of_time_waits(shown, monkeypatch):
     now[0] += 0.5
     view(sample(3.0, 0.9, 0, 0.0))
     assert waited == [pytest.approx(1.0)]
-
-
-def test_without_a_browser_the_wait_ends_and_returns_false(shown):
-    assert not shown[0].wait_for_viewer(0.0)
 
 
 SCENARIO = MODELS / "base.scenario.yaml"
@@ -221,9 +207,3 @@ def test_only_browsers_on_this_machine_reach_it():
     # Another address of this machine: a server that listens on all of them would answer.
     with pytest.raises((ConnectionRefusedError, TimeoutError)):
         socket.create_connection(("127.0.0.2", meshcat.port()), timeout=10.0)
-
-
-def test_others_that_are_started_later_do_so_again(logged):
-    silent_meshcat()
-    Meshcat()
-    assert [line.partition(" at ")[0] for line in logged] == ["Meshcat listening for connections"]

@@ -12,7 +12,7 @@ from coop_drake.scenario import load_scenario
 from coop_drake.viz import inline_frame, recording_html, write_recording
 from coop_drake.viz.recording import kept_frames, page_content, with_overlay
 from tests.support.cases import case
-from tests.support.recorded import messages, paths, played, track
+from tests.support.recorded import paths, played, track
 from tests.support.scenarios import MODELS
 from tests.support.synthetic_log import synthetic_log, synthetic_plan
 
@@ -97,27 +97,6 @@ def test_the_cells_take_turns_as_they_were_logged(text):
             assert times[times > seen.min()][0] == pytest.approx(switches[index], abs=0.05)
 
 
-def test_the_goals_frame_is_as_high_as_the_object(text):
-    """The shipped object is a box 0.2 m high whose middle is 0.4 m above the floor."""
-    told = [message for message in messages(text) if message.get("path") == "/plan/goal_pose/frame"]
-    packed = told[0]["object"]["geometries"][0]["data"]["attributes"]["position"]["array"]
-    heights = np.frombuffer(packed.data, dtype=np.float32).reshape(-1, 3)[:, 2]
-    np.testing.assert_allclose([heights.min(), heights.max()], [0.3, 0.5], atol=1e-6)
-
-
-def test_cells_are_outlined_through_the_bodies_above_them(text):
-    through = {
-        message["path"]
-        for message in messages(text)
-        if message["type"] == "set_property"
-        and (message["property"], message["value"]) == ("material.depthTest", False)
-    }
-    assert through >= {
-        "/plan/cells/000/outline/<object>",
-        "/plan/goal_regions/000/outline/<object>",
-    }
-
-
 def test_an_arrow_is_as_long_as_the_force_is_strong(text):
     log = synthetic_log(case("base"))
     times = np.linspace(1.0, 11.0, 40)
@@ -133,20 +112,6 @@ def test_the_trail_grows_from_nothing_to_the_whole_way(text):
     assert (np.diff(drawn) >= 0.0).all()
     length = np.linalg.norm(np.diff(synthetic_log(case("base")).object_pose[:, :2], axis=0), axis=1).sum()
     assert drawn[-1] == pytest.approx(6.0 * length / 0.03, rel=0.01)
-
-
-def test_every_track_lasts_as_long_as_the_slider(text):
-    ends = {
-        track(text, path, name)[0][-1]
-        for path, name in (
-            (OBJECT, "position"),
-            ("/forces/robot_0", "scale"),
-            ("/plan/cells/000", "visible"),
-            ("/motion/trail/<object>", "geometry[drawRange].count"),
-        )
-    }
-    (duration,) = re.findall(r'"duration": ([\d.]+)', text)
-    assert ends == {float(duration)}
 
 
 def test_a_page_of_another_make_is_refused():

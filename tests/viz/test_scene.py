@@ -34,12 +34,6 @@ def test_a_long_obstacle_is_a_shelf_a_short_one_a_pillar_and_one_that_is_not_con
     assert kinds(FLOOR - corner - PILLAR) == ["pillars"]
 
 
-def test_floor_grid_and_walls_stand_on_every_stage_but_small_floors_need_no_grid():
-    for name in ("floor", "grid", "walls", "edges/foot", "edges/top"):
-        assert staged(FLOOR - SHELF).HasPath(f"/stage/{name}")
-    assert staged(box(0.2, 0.2, 0.9, 0.8)).HasPath("/stage/floor")
-
-
 @pytest.fixture
 def twins(tmp_path):
     """The shipped team with two robots of the same model."""
@@ -68,13 +62,3 @@ def test_robots_of_one_model_get_the_colours_of_the_figures(twins):
 
 def test_the_scene_paints_arrows_and_grasps_alike(twins):
     assert hex_colour(TeamView(twins, Meshcat()).colours[1]) == robot_colour(1).lower()
-
-
-def test_robots_of_different_models_keep_their_colours():
-    builder = DiagramBuilder()
-    team = build_team_plant(load_scenario(MODELS / "base.scenario.yaml"), builder)
-    before = [painted(team, robot.base_body) for robot in team.robots]
-    colours = [hex_colour(one) for one in paint_robots(team)]
-    builder.Build()
-    assert [painted(team, robot.base_body) for robot in team.robots] == before
-    assert len(set(colours)) == 2

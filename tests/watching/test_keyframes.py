@@ -141,19 +141,6 @@ def test_a_cut_tiles_theta_and_the_joint_without_gap_or_overlap():
         assert sum(leaf.intervals[0][1] - leaf.intervals[0][0] for leaf in strips) == pytest.approx(2 * pi)
 
 
-def test_captions_say_what_happens_and_what_a_margin_is_worth(found, apart):
-    recorded, frames = found
-    splitting = next(frame for frame in frames if frame.state.splits and frame.state.verdict is None)
-    assert "halved" in splitting.headline
-    assert splitting.headline.endswith("along θ")
-    assert f"{frames[-1].state.slices} slices made" in frames[-1].counters
-    assert recorded.axis_names == ("θ",)
-    assert apart[1][-1].headline.startswith("Infeasible, proved")
-    shy = keyframes(rod_recording(WIDE, margin=0.06), 3)[-1]
-    assert shy.headline.startswith("No path keeps 0.06 m from the walls")
-    assert "proved" not in shy.headline
-
-
 def test_the_papers_algorithms_and_the_whole_portfolio_can_be_watched():
     printed = keyframes(rod_recording(WIDE, "paper"), 6)
     assert printed[0].state.slices < printed[-1].state.slices
@@ -215,20 +202,6 @@ def test_no_more_states_than_asked_for_the_last_one_the_verdict_no_split_lost(mo
     halved = [(event.slice, event.axis) for event in recorded if isinstance(event, SliceSplit)]
     assert [(leaf.slice, axis) for state in found for leaf, axis in state.splits] == halved
     assert len(found[-1].history) == sum(isinstance(event, ChannelSearched) for event in recorded)
-
-
-def test_states_lie_evenly_over_the_steps():
-    recorded = rod_recording().events
-    every = search_states(recorded, 10_000)
-    few = search_states(recorded, 6)
-    steps = [[state.slices for state in every].index(state.slices) for state in few]
-    gaps = [second - first for first, second in pairwise(steps)]
-    assert max(gaps) - min(gaps) <= 3
-
-
-def test_a_single_keyframe_is_refused():
-    with pytest.raises(ValueError, match="2 keyframes or more, got 1"):
-        search_states(rod_recording().events, 1)
 
 
 def test_explorations_that_take_turns_are_kept_apart():

@@ -67,19 +67,3 @@ def test_a_mistake_is_answered_with_what_is_allowed_and_leaves_nothing(room, tmp
     assert result.exit_code == 2
     assert said in result.stderr
     assert not (tmp_path / "out").exists()
-
-
-def test_an_interruption_leaves_whole_files_only(room, tmp_path, monkeypatch):
-    def interrupted(*_):
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr(watching, "write_scene", interrupted)
-    result = invoke("watch", room, "--output", tmp_path, "--frames", 2)
-    assert result.exit_code == 130
-    assert {path.name for path in tmp_path.iterdir()} == {
-        ".coop_drake_results.json",
-        "think_0001.png",
-        "think_0002.png",
-        "think.png",
-        "think.gif",
-    }
