@@ -52,26 +52,6 @@ def test_every_key_of_a_scenario_is_listed_with_its_meaning(listed):
             assert key.kind
 
 
-def test_limits_are_listed_in_words(listed):
-    def allowed(section, name):
-        return next(key.kind for key in listed[section].keys if key.name == name)
-
-    assert allowed("maps", "tolerance") == "a positive number, less than 0.01"
-    assert allowed("planner", "margin") == "zero or a positive number"
-    assert allowed("planner", "max_slices") == "a positive whole number"
-    assert allowed("deployment", "mass_error") == "a number between -0.9 and 10"
-    assert allowed("deployment.actuators", "base_force") == "a positive number, or null"
-    assert allowed("gains.sets.NAME: !FixedGains", "energy_factor") == "a number of at least 1"
-    assert allowed("gains", "sets") == (
-        "a mapping from names to a mapping with a tag, one of !FixedGains, !ScheduledGains"
-    )
-
-
-def test_units_stand_apart(listed):
-    units = {key.name: key.unit for key in listed["deployment.actuators"].keys}
-    assert units == {"base_force": "N", "base_torque": "N m", "joint_effort": "N m or N", "lag": "s"}
-
-
 def test_the_scenario_that_is_shown_can_be_carried_out(tmp_path):
     path = tmp_path / "corridor.scenario.yaml"
     path.write_text(shown("own_scenario.md", "yaml"), encoding="utf-8")

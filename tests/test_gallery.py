@@ -8,7 +8,7 @@ from coop_drake.plant import planning_problem
 from coop_drake.scenario import load_scenario
 from docs.gallery import __main__ as gallery
 from docs.gallery.cases import FLOORS, TEAMS
-from docs.gallery.page import answer_in_words, gallery_page
+from docs.gallery.page import gallery_page
 from docs.gallery.stills import BrowserError, browser
 
 ARRIVED = {
@@ -21,11 +21,6 @@ ARRIVED = {
     "peak_speed_m_s": 0.53,
 }
 PROVED = {"answer": "infeasible", "reason": "the doorway is too narrow"}
-
-
-def test_there_are_six_floors_and_six_teams_under_names_of_their_own():
-    names = [case.name for case in (*FLOORS, *TEAMS)]
-    assert (len(FLOORS), len(TEAMS), len(set(names))) == (6, 6, 12)
 
 
 @pytest.mark.parametrize("case", [case for case in FLOORS if case.file], ids=lambda case: case.name)
@@ -43,12 +38,6 @@ def test_every_case_has_its_still_its_answer_and_its_commands():
     assert "closed.html" not in page
     assert "infeasible.** The doorway is too narrow." in page
     assert "$ coop-drake new three_robots --robots 3\n$ coop-drake run three_robots/three_robots" in page
-
-
-def test_a_failed_run_is_called_so():
-    assert (
-        answer_in_words({**ARRIVED, "outcome": "failed", "violation": "too near"}) == "**Failed**: too near."
-    )
 
 
 def test_without_a_browser_nothing_is_run(monkeypatch, tmp_path, capsys):

@@ -101,29 +101,6 @@ def failing(error):
     return work
 
 
-def test_a_failed_task_is_told_and_does_not_end_the_others():
-    tasks = [Task("a", failing(WorkerError("no luck"))), Task("b", lambda rows: [ROW])]
-    outcomes = {done.task.name: (done.rows, done.error) for done in worked(tasks, list, jobs=1)}
-    assert str(outcomes["a"][1]) == "no luck"
-    assert outcomes["b"] == ([ROW], None)
-
-
-def test_whoever_stops_listening_stops_the_work():
-    started = threading.Event()
-
-    def quick(rows):
-        started.wait(10)
-        return []
-
-    def endless(rows):
-        started.set()
-        return [Row("a/b/c", in_own_process(_busy, limit=100).cpu_seconds, "s")]
-
-    listening = worked([Task("quick", quick), Task("endless", endless)], list, jobs=2)
-    assert next(listening).task.name == "quick"
-    listening.close()
-
-
 @pytest.fixture
 def run(monkeypatch, tmp_path):
     """Run the command with other tasks; returns its result and the rows that it wrote, None for no file."""

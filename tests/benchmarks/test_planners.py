@@ -1,7 +1,5 @@
 """Questions of growing size, our planner and its peers on them: what is asked, counted and credited."""
 
-import pickle
-
 import numpy as np
 import pytest
 
@@ -12,15 +10,12 @@ from benchmarks.planner.contradiction import Patience, contradiction_rows
 from benchmarks.planner.critical_width import Corridor, critical_interval
 from benchmarks.planner.family import (
     corridor_problem,
-    crowd_problem,
     first_question,
-    shelf_problem,
 )
-from benchmarks.planner.gcs_peer import run_gcs
 from benchmarks.planner.head_to_head import judged
 from benchmarks.planner.ours import Planned, plan_repeatedly
 from benchmarks.planner.stages import STAGES, without_stage
-from benchmarks.questions.peers import PeerRun, fault_of, free_goals, prepared_check, run_ompl, run_trees
+from benchmarks.questions.peers import PeerRun, fault_of, run_ompl, run_trees
 from coop_drake.planning.sampling.collision import grid_for_team, is_free
 from coop_drake.tree.team_arrays import team_arrays
 
@@ -38,24 +33,6 @@ HONEST = straight(EASY, 0.3, -0.2)
 def starts_freely(problem):
     team = team_arrays(problem.tree)
     return is_free(team, grid_for_team(problem.workspace, team), problem.start.astype(float), 0.0)
-
-
-MAKERS = {
-    "corridor": (lambda: corridor_problem(0.9), 2),
-    "four": (lambda: corridor_problem(1.3, 1.5, robots=4), 4),
-    "three joints": (lambda: corridor_problem(joints_per_arm=3), 6),
-    "crowd": (lambda: crowd_problem(6), 6),
-    "shelves": (lambda: shelf_problem(500), 2),
-}
-
-
-@pytest.mark.parametrize(("make", "joints"), MAKERS.values(), ids=MAKERS)
-def test_questions_can_be_started_have_as_many_joints_as_asked_and_are_the_same_every_time(make, joints):
-    problem, again = make(), make()
-    assert starts_freely(problem)
-    assert [joint.index for joint in problem.tree.joints] == list(range(joints))
-    assert problem.workspace.wkb == again.workspace.wkb
-    assert pickle.dumps(team_arrays(problem.tree)) == pickle.dumps(team_arrays(again.tree))
 
 
 @pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
@@ -90,22 +67,6 @@ def test_a_peer_finds_a_path_that_holds_and_the_same_again_and_gives_up_when_its
         assert item.checks == again[item.seed].checks > 0
     (only,) = run(corridor_problem(0.77), (1,), small)
     assert (only.found, only.checks > 0) == (False, True)
-
-
-@pytest.mark.slow
-def test_regions_of_drake_s_planner_hold_a_path_between_walls_and_without_time_there_is_none():
-    run = run_gcs(EASY, 60.0)
-    assert run.regions > 0
-    assert fault_of(EASY, run.path) == ""
-    nothing = run_gcs(EASY, -1.0)
-    assert (nothing.regions, len(nothing.path)) == (0, 0)
-
-
-def test_goals_keep_joints_that_are_asked_for():
-    free = free_goals(EASY, prepared_check(EASY), 5, seed=1)
-    assert free.shape == (5, 5)
-    assert (free[:, :3] == EASY.goal_pose).all()
-    assert len(np.unique(free[:, 3])) == 5
 
 
 def test_honest_paths_pass_and_wrong_ones_are_told_apart():

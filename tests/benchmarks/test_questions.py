@@ -20,16 +20,14 @@ from benchmarks.questions.answering import (
     ask,
     sampled_margin,
 )
-from benchmarks.questions.floors import FLOORS, random_floor
 from benchmarks.questions.peers import Searched, fault_of, search_by_peers
 from benchmarks.questions.question import narrowest_corridor, random_question
 from benchmarks.questions.settings import QuestionSettings
 from benchmarks.questions.summary import summarise_questions
 from benchmarks.questions.teams import SHAPES
-from benchmarks.study import Results, Study, batches_of, load_study
+from benchmarks.study import Study, batches_of, load_study
 from coop_drake.answers import Found, Infeasible, Undecided
 from coop_drake.answers.plan import SearchReport
-from coop_drake.answers.problem import at_goal
 from coop_drake.campaign.execution import Order, make_batch
 from coop_drake.campaign.plans import source_digest
 from coop_drake.campaign.records import CampaignFolder, table_of
@@ -71,33 +69,6 @@ def test_a_question_is_an_ordinary_scenario_that_begins_and_ends_without_collisi
     assert list(collisions(problem.tree, problem.start, problem.workspace)) == []
     assert question.robots == 2
     assert question.kind.split(",")[0] in SHAPES
-
-
-def test_some_joints_have_goals_at_which_the_team_is_free(tmp_path):
-    asked = QuestionSettings(seeds=(3,), robots=(2,), most_joints=2, floors=("door",))
-    for number in range(30):
-        problem = random_question(asked, number, tmp_path / str(number)).problem
-        if any(goal is not None for goal in problem.goal_joints):
-            break
-    random, tree = np.random.default_rng(0), problem.tree
-    tried = (
-        at_goal(problem.goal_pose, problem.goal_joints, random.uniform(tree.joint_lower, tree.joint_upper))
-        for _ in range(300)
-    )
-    assert None in problem.goal_joints
-    assert any(not list(collisions(tree, z, problem.workspace)) for z in tried)
-
-
-@pytest.mark.parametrize("kind", FLOORS)
-def test_floors_hold_the_regions_of_start_and_goal(kind):
-    drawn = [random_floor(np.random.default_rng([1, k]), kind, 1.5, 0.9) for k in range(20)]
-    floors = [floor for floor in drawn if floor is not None]
-    assert len(floors) > 10
-    for floor in floors:
-        assert floor.polygon.is_valid
-        assert floor.polygon.intersects(floor.first)
-        assert floor.polygon.intersects(floor.last)
-        assert isnan(floor.width) if kind == "room" else 0.5 < floor.width < 2.0
 
 
 def test_the_narrowest_corridor_of_a_bar_is_as_wide_as_the_bar():
@@ -243,30 +214,6 @@ def test_what_makes_an_answer_wrong_and_it_counts_once(changes, wrong):
     assert record.is_wrong == bool(wrong)
     every = summary(RIGHT, record)[-1]
     assert (every.count, every.wrong) == (2, wrong)
-
-
-def test_questions_are_grouped_by_what_makes_them_hard():
-    rows = [("corridor", "plan", True, False), ("corridor", "infeasible", True, True),
-            ("corridor", "plan", False, False), ("rooms", "undecided", False, True)]  # fmt: skip
-    questions = summary(
-        *(
-            QuestionRecord(i, i, floor, 2 + i % 2, 2, "bar", verdict, 1.0 + i, verified=verified,
-                           peer_found=found, corners=12 + i, width_ratio=[0.9, 1.1, 1.1, np.nan][i])
-            for i, (floor, verdict, verified, found) in enumerate(rows)
-        )
-    )  # fmt: skip
-    assert {(one.axis, one.group): one.count for one in questions} == {
-        ("floor", "corridor"): 3, ("floor", "rooms"): 1, ("robots", "2"): 2, ("robots", "3"): 2,
-        ("joints", "1 to 2"): 4, ("corners", "0 to 12"): 1, ("corners", "13 to 24"): 3,
-        ("width", "0.8 to 1"): 1, ("width", "1 to 1.2"): 2, ("all", "all"): 4,
-    }  # fmt: skip
-    corridor, rooms, *_, every = questions
-    assert (corridor.group, corridor.plans, corridor.infeasible, corridor.wrong) == ("corridor", 2, 1, 2)
-    assert (rooms.undecided, rooms.peer_found, rooms.wrong) == (1, 1, 0)
-    assert (every.count, every.seconds.largest) == (4, 4.0)
-    results = Results(questions, missing=3)
-    said = "4 questions: 2 wrong answers, 1 undecided. The study is not complete: 3 batches are missing."
-    assert (results.headline, results.good) == (said, False)
 
 
 def test_a_question_whose_process_was_lost_counts_and_has_no_time():

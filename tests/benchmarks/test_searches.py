@@ -79,16 +79,6 @@ def test_departures_reach_the_bounds_of_the_budget_and_never_exceed_them(allowed
     assert values["deployment.measurements.rate_noise"] == values["deployment.messages.loss"] == 0.0
 
 
-def test_a_direction_turned_by_half_a_turn_gives_the_opposite_error(allowed):
-    bounded, _ = allowed
-    there, back = bounded.middle, bounded.middle
-    at = bounded.names.index("direction of position")
-    there[at], back[at] = 0.0, 0.5
-    one, two = (waves_in(bounded.values(fractions)).x for fractions in (there, back))
-    assert one.size == two.size > 0.0
-    assert (one.phase - two.phase) % 1.0 == pytest.approx(0.5)
-
-
 def test_one_departure_acts_alone_at_its_multiple_and_all_errors_together(allowed):
     budget, tree = allowed[0].budget, allowed[1]
     angles = departures_at(budget, tree, "angles", 3.0, 1)
@@ -153,12 +143,6 @@ def test_a_lost_run_ends_a_search(case):
     assert found.values["a"] > 0.6
     assert len(found.margins) < 60
     assert "shares" not in case or found.first.budget_share == 2.0
-
-
-def test_the_lost_run_with_the_smallest_margin_is_the_worst_of_its_generation():
-    found = worst(lambda a, b: record(-b, arrived=a == 0.5))
-    assert not found.record.arrived
-    assert found.record.funnel_margin == min(found.margins[1:])
 
 
 @pytest.mark.parametrize("edge", [0.3, 1.0, 1.7, 11.3])
@@ -308,18 +292,6 @@ def find(seed, before, worst, arrived=True, reason="", margin="funnel_margin", r
 
 def headline(*findings):
     return Results(findings=findings).headline
-
-
-def test_searches_of_a_scenario_are_told_together():
-    shares = [find(4, 0.4, 0.5, margin="budget_share"), find(5, 0.4, 0.9, margin="budget_share")]
-    margins, share = summarise_searches(
-        [*(find(k, 9e-3, 1e-3 * w) for k, w in ((1, 5), (2, 3), (3, 7))), *shares]
-    )
-    assert (margins.searches, margins.runs, margins.lost, margins.typical) == (3, 30, 0, 5e-3)
-    assert (margins.worst.file, share.worst.file) == ("found/2", "found/5")
-    (lost,) = summarise_searches([find(1, 9e-3, 5e-3), find(2, 9e-3, 6e-3, arrived=False)])
-    assert (lost.lost, lost.worst.seed) == (1, 2)
-    assert headline(*shares) == "None of 2 searches, with 20 runs, found a run that is lost."
 
 
 def test_searches_that_could_not_be_made_hide_no_loss():

@@ -61,31 +61,32 @@ MILD = {
     "sampling": sampled(RATE),
     "sampling, quicker": sampled(),
     "saturation": Deployment(actuators=ActuatorLimits(base_force=50.0)),
-    "lag": sampled(actuators=ActuatorLimits(lag=0.005)),
     "noise": sampled(RATE, measurements=Measurements(1e-3, 5e-4, 1e-3)),
-    "waves": sampled(measurements=Measurements(waves=Waves(angle=Wave(1e-3, 0.3), turn_rate=Wave(5e-3)))),
     "delay": sampled(measurements=Measurements(delay=0.005)),
     "model error": Deployment(mass_error=0.5),
-    "lost reports": sampled(RATE, messages=Messages(loss=0.7)),
     "late reports": sampled(RATE, messages=Messages(delay=0.2)),
-    "repeated reports": sampled(RATE, messages=Messages(repeat=1.0, delay=0.05)),
-    "lost measurements": sampled(measurements=Measurements(loss=0.1)),
-    "late measurements": sampled(measurements=Measurements(late=0.2, late_by=0.02)),
-    "a biased pose in one robot": of_one(pose_bias=PoseBias(x=0.005)),
     "a biased pose in all": sampled(robots={"*": RobotDepartures(pose_bias=PoseBias(x=0.005))}),
-    "odometry": of_one(odometry_scale=0.05),
     "a late sample": of_one(sample_offset=0.0045),
-    "a clock": of_one(clock_error=0.05),
-    "a late switch": of_one(switch_delay=0.05),
-    "silence": of_one(silence=Silence(0.5, 0.5)),
-    "blocked wheels": of_one(blocked=BlockedWheels(0.5, 0.02)),
-    "wheels that slip": of_one(slip=WheelSlip(0.5, 0.5, 0.2)),
-    "friction": sampled(floor=Floor(coulomb_friction=20.0, viscous_friction=5.0)),
-    "friction of joints": sampled(joint_friction=JointFriction(coulomb=0.3, viscous=0.2)),
-    "slope": sampled(floor=Floor(slope=0.01)),
     "push": pushed(20.0),
-    "start": sampled(start_offset=StartOffset(0.005, -0.005, 0.005, (0.005, -0.005))),
-}
+    "motors and the floor": sampled(
+        actuators=ActuatorLimits(lag=0.005),
+        floor=Floor(coulomb_friction=10.0, viscous_friction=5.0, slope=0.003),
+        joint_friction=JointFriction(coulomb=0.1, viscous=0.1),
+        start_offset=StartOffset(0.002, -0.002, 0.002, (0.002, -0.002)),
+    ),
+    "sensors and messages": sampled(
+        measurements=Measurements(
+            loss=0.05, late=0.1, late_by=0.01, waves=Waves(angle=Wave(1e-3, 0.3), turn_rate=Wave(5e-3))
+        ),
+        messages=Messages(loss=0.5, repeat=0.5, delay=0.02),
+    ),
+    "one robot": of_one(
+        pose_bias=PoseBias(x=0.003), odometry_scale=0.02, clock_error=0.02, switch_delay=0.02,
+        silence=Silence(0.5, 0.1), blocked=BlockedWheels(0.5, 0.02), slip=WheelSlip(0.7, 0.3, 0.1),
+    ),
+}  # fmt: skip
+"""Each departure alone arrives in both loops, as `tests/compiled_loop/test_against_drake.py` shows."""
+
 QUICK = {"sampling", "noise", "delay", "model error", "push"}
 """Departures that are no slow tests."""
 

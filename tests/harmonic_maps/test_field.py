@@ -50,13 +50,6 @@ def test_field_is_continuous_towards_the_goal(harmonic_map):
             np.testing.assert_allclose(field(goal + distance * out) / distance * 0.25, -out, atol=1e-3)
 
 
-def test_radius_of_slowing_down_can_be_chosen(harmonic_map):
-    field = VelocityField(harmonic_map, slowdown_radius=0.01)
-    goal = np.array(harmonic_map.goal.coords[0])
-    assert np.hypot(*field(goal + np.array([0.0, 0.02]))) == pytest.approx(1.0)
-    assert np.hypot(*field(goal + np.array([0.0, 0.005]))) == pytest.approx(0.5)
-
-
 def test_trial_points_outside_get_a_finite_velocity_that_leads_back(harmonic_map):
     field = VelocityField(harmonic_map)
     outside, normals = domains.off_wall(harmonic_map.region, -0.01)
@@ -296,12 +289,3 @@ def test_samples_lie_on_the_walls_and_arc_length_runs_through_all_rings():
     assert samples.arc_length[-1] == pytest.approx(HALL.length, abs=0.01)
     assert list(np.unique(samples.ring)) == [0, 1]
     np.testing.assert_allclose(np.diff(samples.vertex_arc_length)[:3], [6.0, 4.0, 6.0])
-
-
-def test_walls_go_round_the_circle_in_proportion_to_their_length():
-    mapped = HarmonicMap(*domains.u_corridor(), tolerance=1e-7)
-    samples = sample_boundary(mapped)
-    turns = np.unwrap(np.arctan2(*samples.expected.T[::-1])) / (2.0 * np.pi)
-    along = (samples.arc_length - samples.arc_length[0]) / mapped.region.length
-    np.testing.assert_allclose(turns - turns[0], along)
-    np.testing.assert_allclose(samples.vertex_images, mapped(samples.vertices)[0], atol=1e-6)

@@ -128,17 +128,6 @@ def test_direction_turns_with_the_cell_and_ignores_its_place_and_size(cell, angl
         np.testing.assert_allclose(unit(there(image)), turn @ unit(here(point)), atol=1e-4)
 
 
-@FEW
-@given(CELLS)
-def test_certificate_holds_on_the_whole_boundary(cell):
-    harmonic_map = HarmonicMap(cell, goal_of(cell))
-    ring = shapely.segmentize(harmonic_map.region.exterior, 0.003)
-    T, _ = harmonic_map(shapely.get_coordinates(ring))
-    bound = 1.5 * harmonic_map.accuracy.error_estimate + 1e-12
-    assert np.abs(np.hypot(*T.T) - 1.0).max() <= bound
-    assert harmonic_map.accuracy.residual <= 1e-6
-
-
 @pytest.fixture(scope="module", params=[1, 2, 3])
 def mapped(request):
     room = domains.random_room(np.random.default_rng(request.param), holes=4)

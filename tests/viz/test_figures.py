@@ -1,5 +1,8 @@
 """The figures of a run and of a search for gains: which files, and what is drawn in them."""
 
+from __future__ import annotations
+
+import os
 from dataclasses import replace
 
 import numpy as np
@@ -9,11 +12,16 @@ from matplotlib.colors import to_hex
 from PIL import Image
 
 from coop_drake.answers.speeds import base_speeds
+from coop_drake.diagram import TELEMETRY
 from coop_drake.drawing.canvas import house_style, picture_of
 from coop_drake.drawing.colours import INK, OBJECT, robot_colour
+from coop_drake.errors import ProcessError
 from coop_drake.laws import ScheduledGains
+from coop_drake.scenario import load_scenario
 from coop_drake.tuning import CRITERIA, GainTrial, Limit, Objective, Search, TrialOutcome
 from coop_drake.viz import write_figures
+from coop_drake.viz.block_diagram import INPUTS, OUTPUTS, block_diagram_figure, signal_flow
+from coop_drake.viz.drawing_processes import DrawingProcesses
 from coop_drake.viz.figures import (
     RunFigures,
     TimeAxes,
@@ -28,7 +36,9 @@ from coop_drake.viz.figures import (
 from coop_drake.viz.tuning_figure import tuning_figure
 from tests.support.cases import case
 from tests.support.figure_names import OF_EVERY_RUN, OF_TWO_ROBOTS
+from tests.support.scenarios import MODELS
 from tests.support.sliding import with_sliding_joint
+from tests.support.small_loop import small_loop
 from tests.support.synthetic_log import synthetic_log, synthetic_plan
 
 
@@ -172,3 +182,125 @@ def test_what_breaks_a_limit_and_what_is_chosen_are_distinguished(found):
     assert drawn["breaks a limit"] == [[20.0, 200.0]]
     assert drawn["keeps all limits"] == [[14.0, 150.0], [14.0, 180.0]]
     assert drawn["chosen"] == [[14.0, 150.0]]
+
+
+# The block diagram shows what is wired, and nothing else.
+
+
+@pytest.fixture(scope="module")
+def loop():
+    return small_loop("three")
+
+
+@pytest.fixture(scope="module")
+def controller(loop):
+    return signal_flow(loop.bare_controllers[1], "controller", telemetry=frozenset(TELEMETRY))
+
+
+def test_every_block_and_every_connection_of_the_loop_is_there(loop):
+    flow = signal_flow(loop.diagram, "loop")
+    assert {block.name for block in flow.blocks} == {
+        system.get_name() for system in loop.diagram.GetSystems()
+    }
+    assert len(flow.signals) == len(loop.diagram.connection_map())
+    assert {(s.source, s.sink) for s in flow.signals if s.output == "ready"} == {
+        (f"robot_{k}_controller", "cell_planner") for k in range(3)
+    }
+
+
+def test_what_a_controller_hears_and_says_is_there_without_what_is_only_looked_at(controller):
+    blocks = {block.name: block for block in controller.blocks}
+    assert set(blocks[INPUTS].outputs) == {"robot_state", "object_pose", "current_cell"}
+    assert set(blocks[OUTPUTS].inputs) == {"robot_effort", "ready"}
+    assert blocks["reference_governor"].kind == "ReferenceGovernor"
+
+
+def test_signals_go_from_left_to_right_but_those_that_are_held(controller):
+    columns = {block.name: block.column for block in controller.blocks}
+    back = {s.source for s in controller.signals if columns[s.source] >= columns[s.sink]}
+    assert back == {"governor_state"}
+
+
+def test_the_picture_names_every_block_and_port(loop, controller):
+    figure = block_diagram_figure(loop, robot=1)
+    texts = {text.get_text() for ax in figure.axes for text in ax.texts}
+    for block in controller.blocks:
+        assert {block.name.replace("_", " "), *block.inputs, *block.outputs} <= texts
+    assert {"robot 2 controller", "cell planner", "transport station"} <= texts
+    assert "Controller of robot 1" in {text.get_text() for text in figure.axes[1].texts}
+
+
+def test_a_robot_that_is_not_there_is_refused(loop):
+    with pytest.raises(IndexError, match="robot 3 is not in the team of 3"):
+        block_diagram_figure(loop, robot=3)
+
+
+# Processes that draw a run: what they write, and how their failures and the end of a command reach them.
+
+
+@pytest.fixture
+def drawing():
+    """Processes that were told the plan of a run, and the run's log."""
+    problem, scenario = case("base"), load_scenario(MODELS / "base.scenario.yaml")
+    with DrawingProcesses() as processes:
+        processes.begin(scenario, problem, synthetic_plan(problem))
+        yield processes, synthetic_log(problem)
+
+
+def alive(group: int) -> bool:
+    try:
+        os.killpg(group, 0)
+    except ProcessLookupError:
+        return False
+    return True
+
+
+def test_both_write_what_they_draw_and_end(drawing, tmp_path):
+    processes, log = drawing
+    processes.draw(log, tmp_path)
+    processes.wait("recording", "figures")
+    names = {path.name for path in tmp_path.iterdir()}
+    assert {"transport.html", "fig04_start_and_goal.png", "fig05_path.png", "summary.png"} <= names
+    assert not any(alive(process.pid) for process, _ in processes._running.values())
+
+
+def test_without_figures_the_recording_alone_is_written(tmp_path):
+    problem, scenario = case("base"), load_scenario(MODELS / "base.scenario.yaml")
+    with DrawingProcesses(figures=False) as processes:
+        processes.begin(scenario, problem, synthetic_plan(problem))
+        processes.draw(synthetic_log(problem), tmp_path)
+        processes.wait("recording", "figures")
+    assert [path.name for path in tmp_path.iterdir()] == ["transport.html"]
+
+
+def test_what_goes_wrong_in_a_process_is_raised_here(drawing, tmp_path):
+    processes, log = drawing
+    taken = tmp_path / "taken"
+    taken.write_text("")
+    processes.draw(log, taken)
+    with pytest.raises(OSError, match=r"Not a directory|File exists"):
+        processes.wait("recording", "figures")
+
+
+def test_a_process_that_is_ended_is_named(drawing, tmp_path):
+    processes, log = drawing
+    processes._running["recording"][0].kill()
+    processes.draw(log, tmp_path)
+    with pytest.raises(ProcessError, match="the process that draws the recording ended with code -9"):
+        processes.wait("recording", "figures")
+
+
+def test_both_end_with_the_block_and_with_the_command():
+    problem, scenario = case("base"), load_scenario(MODELS / "base.scenario.yaml")
+    with DrawingProcesses() as processes:
+        processes.begin(scenario, problem, synthetic_plan(problem))
+        begun = [process for process, _ in processes._running.values()]
+        assert [process.is_alive() for process in begun] == [True, True]
+    assert not any(process.is_alive() for process in begun)
+    with DrawingProcesses() as processes:
+        processes.begin(scenario, problem, synthetic_plan(problem))
+        for _, connection in processes._running.values():
+            connection.close()  # As the end of the command closes it.
+        for process, _ in processes._running.values():
+            process.join(timeout=300)
+            assert process.exitcode == 0
