@@ -269,7 +269,7 @@ def test_a_clock_that_jumps_is_seen_by_the_numbers_of_samples(last, jumps):
 def transport(tmp_path_factory):
     folder = tmp_path_factory.mktemp("stops")
     file = folder / "room.scenario.yaml"
-    goal = {"object": {"x": 4.5, "y": 2.0, "theta": 3.0}}
+    goal = {"object": {"x": 3.5, "y": 2.0, "theta": 1.5}}
     write_scenario(file, goal=goal, deployment={"preset": "mobile_base", "budget": "all"})
     result = invoke("plan", file, "--out", folder)
     assert result.exit_code == 0, result.output
@@ -282,12 +282,12 @@ def transport(tmp_path_factory):
 @pytest.mark.slow
 def test_whenever_the_drives_brake_the_team_rests_where_it_can_begin_a_cell_anew(transport):
     scenario, plan, maps = transport
-    gaps = [(round(begin * 200), round(begin * 200) + 60) for begin in (0.8, 3.8, 8.0)]
+    gaps = [(round(begin * 200), round(begin * 200) + 60) for begin in (0.8, 3.8)]
     exchange = DirectExchange(gaps)
     log = simulate_apart(scenario, plan, maps, exchange=exchange)
     stops = exchange.membership.stops
     assert log.reached, log.violation
-    assert len(stops) == 3
+    assert len(stops) == 2
     assert all(stop.certified for stop in stops)
     follows = np.ones(len(log.times), dtype=bool)
     for stop in stops:
