@@ -7,7 +7,8 @@ BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 READY_TO_DEVELOP := $(VENV)/.ready-to-develop
 WARM := $(VENV)/.warm
-PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt
+# Python compiles a module to bytecode where it is first imported: most of those installed never are.
+PIP := $(BIN)/python -m pip install --quiet --no-compile --disable-pip-version-check -c constraints.txt
 CODE := coop_drake tests benchmarks notebooks docs paper
 # The kernels are small; threads of BLAS would only get into each other's way.
 export OMP_NUM_THREADS ?= 1

@@ -109,11 +109,6 @@ def test_departures_two_and_a_half_times_as_large_lose_an_axis(base):
     assert min(run.nearest for run in runs) < 0.0
 
 
-def test_cells_are_left_at_rest(base):
-    rests = [transition.gains.rest for transition in base.transitions]
-    assert all((rest.rate > 0.0).all() and (rest.reach > 0.0).all() for rest in rests)
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("flags", [["--robots", "3", "--door", "1.3"], ["--robots", "4"]])
 def test_narrow_limits_of_rates_are_kept_by_gains_for_a_share_of_them(tmp_path, flags):

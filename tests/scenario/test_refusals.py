@@ -316,20 +316,3 @@ def test_text_that_does_not_parse_is_refused_with_its_line(text, place, problem,
         load_scenario(path)
     assert caught.value.key == place
     assert problem in str(caught.value.value)
-
-
-@pytest.mark.parametrize(
-    ("content", "allowed"),
-    [
-        (b"", "a mapping with the keys workspace, directives, start, goal"),
-        (b"- 1\n- 2\n", "a mapping with the keys workspace, directives, start, goal"),
-        (b"\xff\xfe\xff", "a readable file"),
-        (None, "a readable file"),
-    ],
-)
-def test_a_file_that_is_no_scenario_or_missing_is_refused(content, allowed, tmp_path):
-    path = tmp_path / "other.scenario.yaml"
-    if content is not None:
-        path.write_bytes(content)
-    with pytest.raises(ScenarioError, match=allowed):
-        load_scenario(path)
