@@ -26,7 +26,7 @@ from tests.support.scenarios import write_scenario
 
 pytestmark = pytest.mark.slow
 
-RUNS, BATCH = 8, 2
+RUNS, BATCH = 12, 2
 FILE = f"""
 runs:
   scenarios: [room.scenario.yaml]
@@ -158,7 +158,7 @@ def test_a_campaign_that_is_disturbed_in_every_way_ends_as_one_that_is_not(undis
     waited_for(lambda: not processes(str(folder.path)) and gone(worker))
     assert undisturbed.missing(folder)
 
-    quick = {**os.environ, "DASK_DISTRIBUTED__SCHEDULER__WORKER_TTL": "5s"}
+    quick = {**os.environ, "DASK_DISTRIBUTED__SCHEDULER__WORKER_TTL": "8s"}
     last = begun(folder.path, "--json", "--workers", 2, env=quick)
     hanging = worker_of(folder)
     kill(hanging, signal.SIGSTOP)
