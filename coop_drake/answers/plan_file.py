@@ -22,7 +22,7 @@ from coop_drake.typed_data import to_plain
 FORMAT = "coop_drake plan"
 """What the document says it is."""
 
-VERSION = 4
+VERSION = 5
 """Version of its layout; another one is refused."""
 
 OTHERWISE_LONG = ("effort", "alarm_times", "alarm", "ahead_alarm")

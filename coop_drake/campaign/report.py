@@ -85,7 +85,11 @@ def count_trials(runs: Columns, chosen: NDArray[np.bool_] | None = None) -> int:
     return len(set(zip(runs["scenario"][rows], runs["run"][rows], strict=True)))
 
 
-def groups_of(runs: Columns) -> list[tuple[str, str, IntArray]]:
+RunGroup = tuple[str, str, IntArray]
+"""Scenario, tier and row numbers of runs that belong together."""
+
+
+def groups_of(runs: Columns) -> list[RunGroup]:
     """Return scenario, tier and row numbers of the runs that belong together, sorted by name."""
     names = np.array([runs["scenario"], runs["tier"]], dtype=str)
     found, places = np.unique(names, axis=1, return_inverse=True)
@@ -238,10 +242,10 @@ def _heights(numbers: FloatArray, ends: tuple[float, float]) -> tuple[int, ...]:
     return tuple(int(height) for height in np.histogram(numbers, bins=_BINS, range=ends)[0])
 
 
-def summarise(runs: Columns, confidence: float) -> tuple[Group, ...]:
+def summarise(runs: Columns, every: Sequence[RunGroup], confidence: float) -> tuple[Group, ...]:
     """Return how the runs of every scenario and tier went."""
     groups = []
-    for scenario, tier, rows in groups_of(runs):
+    for scenario, tier, rows in every:
         arrived = rows[runs["arrived"][rows]]
         known = {one.name: distribution(runs[one.name][rows if one.margin else arrived]) for one in MEASURES}
         reasons = Counter(runs["reason"][rows[~runs["arrived"][rows]]].tolist()).most_common(_REASONS)
@@ -288,14 +292,14 @@ class WorstRun:
     values: str
 
 
-def worst_runs(runs: Columns, count: int = LISTED) -> tuple[WorstRun, ...]:
+def worst_runs(runs: Columns, groups: Sequence[RunGroup]) -> tuple[WorstRun, ...]:
     """Return lost runs, then those that used more than the budget states, then those with the least margins.
 
     Margins count relative to the median of their scenario and tier.
     """
     margins = np.array([runs[measure.name] for measure in MARGINS])
     shares = np.full_like(margins, np.inf)
-    for _, _, rows in groups_of(runs):
+    for _, _, rows in groups:
         for k in range(len(MARGINS)):
             known = margins[k, rows][np.isfinite(margins[k, rows])]
             if known.size and (typical := float(np.median(known))) > 0.0:
@@ -303,7 +307,7 @@ def worst_runs(runs: Columns, count: int = LISTED) -> tuple[WorstRun, ...]:
     shares[np.isnan(shares)] = np.inf
     beyond = np.where(runs[SHARE] > 1.0, -runs[SHARE], 0.0)
     found = []
-    for row in np.lexsort((runs["run"], shares.min(axis=0), beyond, runs["arrived"]))[:count]:
+    for row in np.lexsort((runs["run"], shares.min(axis=0), beyond, runs["arrived"]))[:LISTED]:
         k = int(np.argmin(shares[:, row]))
         known_share = bool(np.isfinite(shares[k, row]))
         found.append(
@@ -379,14 +383,15 @@ def make_report(
     if runs is None or runs.num_rows == 0:
         return Report(title, tuple(facts), None, 0, nan, (), (), missing)
     known = {name: runs[name].to_numpy() for name in runs.column_names}
+    groups = groups_of(known)
     return Report(
         title,
         tuple(facts),
         loss_rate(count_trials(known, ~known["arrived"]), count_trials(known), confidence),
         count_trials(known, known[SHARE] > 1.0),
         float(np.nanmax(known[SHARE])) if np.isfinite(known[SHARE]).any() else nan,
-        summarise(known, confidence),
-        worst_runs(known),
+        summarise(known, groups, confidence),
+        worst_runs(known, groups),
         missing,
     )
 

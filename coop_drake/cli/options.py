@@ -216,30 +216,35 @@ def command(function: Callable[..., None], output: type[OutputOptions] = OutputO
     whose type is a dataclass an option for each of its fields.
     """
     _, *own = inspect.signature(function).parameters.values()
-    hints: dict[str, Any] = {**get_type_hints(function, include_extras=True), "output": output}
-    listed: list[inspect.Parameter] = []
+    hints: dict[str, Any] = get_type_hints(function, include_extras=True)
     groups: dict[str, Any] = {name: kind for name, kind in hints.items() if is_dataclass(kind)}
-    for one in (*own, inspect.Parameter("output", inspect.Parameter.KEYWORD_ONLY)):
+    listed: list[inspect.Parameter] = []
+    for one in own:
         if one.name in groups:
-            kinds = get_type_hints(groups[one.name], include_extras=True)
-            entries = [(field.name, field.default, kinds[field.name]) for field in fields(groups[one.name])]
+            listed += _options(groups[one.name])
         else:
-            entries = [(one.name, one.default, hints[one.name])]
-        listed += [
-            inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=kind)
-            for name, default, kind in entries
-        ]
+            listed.append(one.replace(kind=one.KEYWORD_ONLY, annotation=hints[one.name]))
+    listed += _options(output)
 
     @wraps(function)
     def called(**values: Any) -> None:
-        made = {
-            name: kind(**{field.name: values.pop(field.name) for field in fields(kind)})
-            for name, kind in groups.items()
-        }
-        with reporting(**vars(made.pop("output"))) as reporter:
-            function(reporter, **values, **made)
+        def made(kind: Any) -> Any:
+            return kind(**{field.name: values.pop(field.name) for field in fields(kind)})
+
+        arguments = {name: made(kind) for name, kind in groups.items()}
+        with reporting(**vars(made(output))) as reporter:
+            function(reporter, **values, **arguments)
 
     made_command: Any = called
     made_command.__signature__ = inspect.Signature(listed)
     made_command.__annotations__ = {one.name: one.annotation for one in listed}
     return made_command
+
+
+def _options(group: Any) -> list[inspect.Parameter]:
+    """Return a parameter for every field of a dataclass of options."""
+    hints, keyword = get_type_hints(group, include_extras=True), inspect.Parameter.KEYWORD_ONLY
+    return [
+        inspect.Parameter(one.name, keyword, default=one.default, annotation=hints[one.name])
+        for one in fields(group)
+    ]

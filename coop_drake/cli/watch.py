@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from math import isfinite
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -20,12 +19,6 @@ _FEWEST, _MOST = 2, 500
 """Numbers of keyframes that make a moving picture and still fit into a page that browsers open [-]."""
 
 EXAMPLES = (("watch models/base.scenario.yaml", "pictures and a page of the search in out/base/think/"),)
-
-
-def _checked_margin(value: float | None) -> float | None:
-    if value is not None and not isfinite(value):
-        raise typer.BadParameter(f"{value} is not a length in metres.")
-    return value
 
 
 def watch_command(
@@ -58,26 +51,14 @@ def watch_command(
             help="Exploration by cells, the paper's exploration, or (portfolio) the whole search of `plan`.",
         ),
     ] = "cells",
-    margin: Annotated[
-        float | None,
-        typer.Option(
-            "--margin",
-            metavar="M",
-            min=0.0,
-            callback=_checked_margin,
-            help="Metres to keep from walls. Only with 0, the default of cells, is 'no path' a proof.",
-        ),
-    ] = None,
 ) -> None:
     """Watch the planner search: pictures, a moving picture and a page to turn in space."""
     from coop_drake import watching
 
     task = read_task(scenario, reporter=reporter)
     folder = ResultFolder.of(task.name, out, "search", below="think")
-    if margin is None:
-        margin = task.problem.settings.margin if strategy == "portfolio" else 0.0
     with reporter.stage("searching") as progress:
-        recording = watching.record_search(task.problem, strategy, margin, progress)
+        recording = watching.record_search(task.problem, strategy, progress)
         shown = watching.keyframes(recording, frames)
     reporter.facts.update(
         answer=recording.verdict.value,
@@ -94,8 +75,6 @@ def watch_command(
     place, page = escape(str(folder.path)), escape(str(written[-1]))
     reporter.say(f"{len(shown)} pictures are in {place}; open {page} in a browser")
     reporter.code = ExitCode.of(recording.verdict.value)
-    if recording.verdict.value == "infeasible" and recording.margin > 0.0:
-        reporter.code = ExitCode.UNDECIDED  # That no path keeps a margin proves nothing about the scenario.
     if reporter.code is not ExitCode.DONE:
         return
     if strategy != "portfolio":  # A search that was watched alone has other cells than the plan.

@@ -49,6 +49,12 @@ _PARTS_PER_ANGLE = 10.0
 faster than the slice's width, and is small against the growth of the sweep itself."""
 
 
+@compiled(borrows=True)
+def arc_parts(half_width: float) -> int:
+    """Number of chords or tangents that replace an arc of a half-angle, of half a turn at most [rad]."""
+    return max(1, ceil(sqrt(_PARTS_PER_ANGLE * min(half_width, pi))))
+
+
 @compiled
 def disc_turn(half_width: float) -> float:
     """Largest angle between neighbouring normals of a polygon that replaces a disc [rad].
@@ -173,7 +179,7 @@ def over_revolute(vertices: FloatArray, centre: float, half_width: float) -> Flo
     Returns:
         Vertices of an enclosing convex polygon, shape (m, 2).
     """
-    count, parts = len(vertices), max(1, ceil(sqrt(_PARTS_PER_ANGLE * min(half_width, pi))))
+    count, parts = len(vertices), arc_parts(half_width)
     edges = edge_directions(vertices)
     radii = np.empty(count)
     angles = np.empty(2 * len(edges) + count * (parts + 1) + 4)
@@ -351,7 +357,7 @@ def under_revolute(vertices: FloatArray, centre: float, half_width: float) -> Fl
     half_width = min(half_width, pi)  # A joint of many turns covers no more; its chords would leap over arcs.
     edges = edge_directions(vertices)
     offsets = support(vertices, edges)
-    parts = max(1, ceil(sqrt(_PARTS_PER_ANGLE * half_width)))
+    parts = arc_parts(half_width)
     half_chord = half_width / parts
     angles, distances = np.empty(len(edges) * (2 + parts)), np.empty(len(edges) * (2 + parts))
     size = 0

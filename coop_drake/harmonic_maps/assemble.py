@@ -39,9 +39,9 @@ from coop_drake.harmonic_maps.evaluate import (
     integer,
     is_inside,
     leaf_at,
+    length_of,
     panel_ends,
     row,
-    rows_of,
     seen_from,
     solved_nodes,
 )
@@ -432,7 +432,7 @@ def _sort_out(
             if (k != own or k < 0) and seen_from(m, k, place, level, x, y)[2] < radius:
                 gain[box] += 1 if place >= 0 else _CORNER
         if state[box] == ON_BOUNDARY and nearest > radius:
-            walls = rows_of(m, EDGES)
+            walls = length_of(m, EDGES, 0)
             state[box] = INSIDE if is_inside(m, row(m, EDGES, 0, 4), walls, x, y) else OUTSIDE
         if state[box] == OUTSIDE:  # no point is ever looked for there
             end, gain[box] = first[box], 0

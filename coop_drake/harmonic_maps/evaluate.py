@@ -136,9 +136,9 @@ def row(flat: FlatMap, array: int, k: int, width: int) -> int:
 
 
 @compiled(borrows=True)
-def rows_of(flat: FlatMap, array: int) -> int:
-    """How many rows an array has."""
-    return int(flat[_HEAD + array * _ENTRY + 1])
+def length_of(flat: FlatMap, array: int, axis: int) -> int:
+    """How long an array is along an axis: its number of rows, or of columns."""
+    return int(flat[_HEAD + array * _ENTRY + 1 + axis])
 
 
 @compiled(borrows=True)
@@ -359,8 +359,8 @@ def solved_nodes(m: FlatMap, k: int, place: int) -> tuple[int, int]:
     """Index range [first, end) of the solved nodes of a regular panel or of a corner's block."""
     if k >= 0:
         return integer(m, CORNER_INDEX, k, 7, 0), integer(m, CORNER_INDEX, k + 1, 7, 0)
-    regular = integer(m, CORNER_INDEX, rows_of(m, CORNERS), 7, 0)
-    count = (int(m[_HEAD + SOURCES * _ENTRY + 2]) - regular) // rows_of(m, PANELS)
+    regular = integer(m, CORNER_INDEX, length_of(m, CORNERS, 0), 7, 0)
+    count = (length_of(m, SOURCES, 1) - regular) // length_of(m, PANELS, 0)
     return regular + place * count, regular + (place + 1) * count
 
 
@@ -380,7 +380,7 @@ def add_to_series(
     corner = row(m, CORNERS, max(k, 0), 15)
     if (place < 0 and level == 0) or (k < 0 and (not opened or seen[1] - radius >= FAR * seen[2])):
         first, last = solved_nodes(m, k, place)
-        sources, n = row(m, SOURCES, 0, 0), int(m[_HEAD + SOURCES * _ENTRY + 2])
+        sources, n = row(m, SOURCES, 0, 0), length_of(m, SOURCES, 1)
         for j in range(first, last):
             for i in range(6):
                 nodes[i, j - first] = m[sources + i * n + j]
@@ -494,7 +494,7 @@ def evaluate_one(m: FlatMap, x: float, y: float) -> tuple[float, float, float, f
     of the vertex and J that of a point just inside; where two panels meet, J is that of a point just off the
     wall.
     """
-    edges, count = row(m, EDGES, 0, 4), rows_of(m, EDGES)
+    edges, count = row(m, EDGES, 0, 4), length_of(m, EDGES, 0)
     if integer(m, LEAF_STATE, leaf_at(m, x, y), 1, 0) != INSIDE and not is_inside(m, edges, count, x, y):
         x, y = nearest_on_walls(m, edges, count, x, y)
     (tu, tv, xu, yu, xv, yv, step_x, step_y), vertex = _all_sums(m, x, y)

@@ -78,6 +78,13 @@ class PairSweeps(NamedTuple):
 
 
 @compiled
+def sweeps_memory(boxes: BoxArrays) -> tuple[PairSweeps, FloatArray]:
+    """Memory for the sweeps of a team's collision pairs, and for their vertices, shape (V, 2)."""
+    count = len(boxes.pair_sweeps)
+    return PairSweeps(np.zeros(count + 1, np.int64), np.zeros(count)), np.empty((16 * count, 2))
+
+
+@compiled
 def swept_piece(
     boxes: BoxArrays,
     piece: int,
@@ -198,9 +205,7 @@ def box_clearance(
     count = len(boxes.team.radii)
     vertices, first = np.empty((32 * count, 2)), np.zeros(count + 1, np.int64)
     discs = np.empty((count, 3))
-    needed, row = len(boxes.pair_sweeps), 0
-    sweeps = PairSweeps(np.zeros(needed + 1, np.int64), np.zeros(needed))
-    swept = np.empty((16 * needed, 2))
+    (sweeps, swept), row = sweeps_memory(boxes), 0
     for k in range(count):
         ring, swept, row = swept_piece(boxes, count - 1 - k, lower, upper, sweeps, swept, row)
         enclosing_disc(ring, discs[k])
@@ -271,9 +276,7 @@ def clearances_in_box(
     for k in range(len(result)):
         result[k] = most
     disc = np.empty(3)
-    needed, row = len(boxes.pair_sweeps), 0
-    sweeps = PairSweeps(np.zeros(needed + 1, np.int64), np.zeros(needed))
-    swept = np.empty((16 * needed, 2))
+    (sweeps, swept), row = sweeps_memory(boxes), 0
     for piece in range(len(boxes.team.radii) - 1, -1, -1):
         ring, swept, row = swept_piece(boxes, piece, lower, upper, sweeps, swept, row)
         enclosing_disc(ring, disc)

@@ -145,14 +145,13 @@ def room_at_entry(seen: AxisRoom, budget: Budget) -> FloatArray:
 
 
 def may_miss(budget: Budget, levels: FloatArray) -> FloatArray:
-    """Return how far off axes may be while no report tells of it, by their levels, shape (axes,) [rad or m].
+    """Return how far off axes may be while no report tells, by either level, shape (2, axes) [rad or m].
 
     Args:
         budget: The budget.
         levels: Of |e| and |e + t e'|, shape (2, axes) [rad or m].
     """
-    farthest: FloatArray = (levels + _noises(budget, np.ones(levels.shape[1]))).max(axis=0)
-    return farthest
+    return levels + _noises(budget, np.ones(levels.shape[1]))
 
 
 def rate_noises(budget: Budget, tracking: AxisTracking, axes: int) -> FloatArray:

@@ -303,9 +303,10 @@ def _check_axis_alarms(
         for name, level, due in zip(("alarm", "ahead_alarm"), levels, least, strict=True):
             _require(level, due, False, f"{where}.{name}[{i}]")
         off = may_miss(budget, levels)
-        check_room(off, room, f"{where}.alarm[{i}]", "its monitor")
+        for name, one in zip(("alarm", "ahead_alarm"), off, strict=True):
+            check_room(one, room, f"{where}.{name}[{i}]", "its monitor")
         if end > leaving_since(budget, leaving):
-            missed = np.maximum(missed, off)
+            missed = np.maximum(missed, off.max(axis=0))
     return missed
 
 

@@ -317,10 +317,6 @@ def _verdict(recording: SearchRecording, state: SearchState) -> str:
     if state.verdict == Verdict.INFEASIBLE.value:
         if recording.reason:
             return f"Infeasible, proved: {recording.reason}"
-        if recording.margin > 0.0:
-            return (
-                f"No path keeps {recording.margin:g} m from the walls: start and goal lie in separate parts"
-            )
         return "Infeasible, proved: start and goal lie in separate parts of what may be free"
     if recording.reason:
         return f"Undecided: {recording.reason}"

@@ -51,7 +51,7 @@ class SearchRecording:
 
     Attributes:
         problem: The planning problem.
-        margin: Clearance from the walls that was asked for [m].
+        margin: Clearance that the channel keeps from the walls [m].
         events: What happened, in order.
         verdict: How the search ended.
         reason: Why there is no channel, in a sentence; empty if the events say it.
@@ -89,18 +89,17 @@ class SearchRecording:
 
 
 def record_search(
-    problem: PlanningProblem, strategy: Strategy, margin: float, progress: Progress | None = None
+    problem: PlanningProblem, strategy: Strategy, progress: Progress | None = None
 ) -> SearchRecording:
     """Search for a plan, and record every event of the search.
 
-    The problem's settings give the budget of slices. The portfolio keeps less than the margin from the walls
-    [m] where there is less.
+    The problem's settings give the budget of slices, and the margin that the portfolio keeps where it can.
     """
     if strategy == "portfolio":
-        return _record_portfolio(problem, margin, progress)
+        return _record_portfolio(problem, progress)
     events: list[Event] = []
     algorithm = Exploration if strategy == "cells" else PaperExploration
-    exploration = algorithm(problem, marginal_workspace(problem, margin), events.append)
+    exploration = algorithm(problem, marginal_workspace(problem, 0.0), events.append)
     budget = problem.settings.max_slices
 
     def count(slices: int) -> None:
@@ -108,13 +107,13 @@ def record_search(
             progress(f"{slices} slices", slices / budget)
 
     outcome = exploration.run(budget, count)
-    return SearchRecording(problem, margin, tuple(events), outcome.verdict)
+    return SearchRecording(problem, 0.0, tuple(events), outcome.verdict)
 
 
-def _record_portfolio(problem: PlanningProblem, margin: float, progress: Progress | None) -> SearchRecording:
+def _record_portfolio(problem: PlanningProblem, progress: Progress | None) -> SearchRecording:
     """Record the proofs of infeasibility, then the boxes of the channel one by one."""
     events: list[Event] = []
-    asked = replace(problem, settings=replace(problem.settings, strategy="portfolio", margin=margin))
+    asked = replace(problem, settings=replace(problem.settings, strategy="portfolio"))
     answer, _ = find_channel(asked, progress, watch=events.append)
     if isinstance(answer, Channel):
         events += _box_events(answer, tuple(sorted({joint.robot for joint in problem.tree.joints})))

@@ -124,7 +124,7 @@ def test_levels_with_which_a_monitor_misses_what_leaves_the_funnel_are_refused(p
     levels = [one + np.array([0.0, 0.5, 0.0]) for one in getattr(plan.transitions[k].tolerance, name)]
     with pytest.raises(RefusalError, match="its monitor may miss") as refusal:
         check_budget(altered(plan, k, **{name: tuple(levels)}))
-    assert refusal.value.where == f"transitions[{k}].tolerance.alarm[0][1]"
+    assert refusal.value.where == f"transitions[{k}].tolerance.{name}[0][1]"
 
 
 def test_levels_of_a_stage_that_begins_early_are_below_what_departs_before_it(plan):

@@ -16,11 +16,9 @@ WIDE, NARROW = 0.22, 0.198
 """Widths of the corridor in which the rod, 0.2 m broad, gets through and does not [m]."""
 
 
-def rod_recording(
-    corridor: float = WIDE, strategy: Strategy = "cells", margin: float = 0.0
-) -> SearchRecording:
+def rod_recording(corridor: float = WIDE, strategy: Strategy = "cells") -> SearchRecording:
     """Record the search for the rod's path."""
-    return record_search(rod_problem(corridor), strategy, margin)
+    return record_search(rod_problem(corridor), strategy)
 
 
 def jointed_rod() -> PlanningProblem:

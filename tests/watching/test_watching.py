@@ -147,7 +147,7 @@ def test_intervals_of_theta_are_brought_onto_the_turn_drawn(interval, parts):
 
 
 def test_a_cut_tiles_theta_and_the_joint_without_gap_or_overlap():
-    recorded = record_search(jointed_rod(), "cells", 0.0)
+    recorded = record_search(jointed_rod(), "cells")
     for frame in keyframes(recorded, 8):
         tiles = cut(frame.state.leaves.values(), 1, frame.cut_at)
         total = sum((b - a) * (d - c) for (a, b), (c, d) in (leaf.intervals for leaf in tiles))
@@ -160,7 +160,7 @@ def test_the_papers_algorithms_and_the_whole_portfolio_can_be_watched():
     printed = keyframes(rod_recording(WIDE, "paper"), 6)
     assert printed[0].state.slices < printed[-1].state.slices
     assert printed[-1].state.verdict in {"found", "below resolution", "budget spent"}
-    boxes = keyframes(rod_recording(0.6, "portfolio", 0.02), 500)
+    boxes = keyframes(rod_recording(0.6, "portfolio"), 500)
     laying = [frame for frame in boxes if frame.state.question == BOXES]
     assert len(laying) > 2
     for laid, frame in enumerate(laying):
@@ -170,7 +170,7 @@ def test_the_papers_algorithms_and_the_whole_portfolio_can_be_watched():
         assert laid == 0 or free.buffer(0.011).covers(line)
     assert boxes[-1].headline.startswith("Found")
     assert all(cell.kind is Kind.FREE for cell in boxes[-1].state.channel)
-    refuted = keyframes(rod_recording(NARROW, "portfolio", 0.02), 6)
+    refuted = keyframes(rod_recording(NARROW, "portfolio"), 6)
     assert refuted[-1].state.verdict == "infeasible"
 
 
@@ -377,7 +377,7 @@ def test_a_recording_leaves_pictures_and_a_page_and_none_of_an_older_one(room, t
     assert facts["bytes"].keys() == {*pictures, *names[2:]}
 
 
-def test_the_exit_code_says_that_there_is_no_path_and_a_margin_proves_nothing(tmp_path, monkeypatch):
+def test_the_exit_code_says_that_there_is_no_path(tmp_path, monkeypatch):
     # The files are tested above.
     monkeypatch.setattr(watching, "write_pictures", lambda recording, frames, directory, progress: [])
     monkeypatch.setattr(watching, "write_scene", lambda recording, frames, path: write_atomically(path, b""))
@@ -389,9 +389,8 @@ def test_the_exit_code_says_that_there_is_no_path_and_a_margin_proves_nothing(tm
         start={"object": {"x": 2.0, "y": 2.0, "theta": 0.0}, "joints": ROOM["start"]["joints"]},
         goal={"object": {"x": 7.0, "y": 2.0, "theta": 0.0}},
     )
-    for margin, code in (("0", 3), ("0.05", 4)):
-        result = invoke("watch", path, "--output", tmp_path / margin, "--frames", 2, "--margin", margin, "-q")
-        assert result.exit_code == code, result.stderr
+    result = invoke("watch", path, "--output", tmp_path / "gap", "--frames", 2, "-q")
+    assert result.exit_code == 3, result.stderr
 
 
 @pytest.mark.parametrize(
@@ -399,9 +398,6 @@ def test_the_exit_code_says_that_there_is_no_path_and_a_margin_proves_nothing(tm
     [
         (None, ["--frames", "1"], "--frames"),
         (None, ["--frames", "many"], "--frames"),
-        (None, ["--margin", "-0.1"], "--margin"),
-        (None, ["--margin", "nan"], "--margin"),
-        (None, ["--margin", "inf"], "inf"),
         (None, ["--strategy", "magic"], "--strategy"),
         ("none.scenario.yaml", [], "none.scenario.yaml"),
     ],

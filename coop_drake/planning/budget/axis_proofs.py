@@ -260,7 +260,7 @@ def _alarms(seen: AxisRoom, budget: Budget, leaving: int, missed: FloatArray) ->
             levels, room = of_stage(seen, budget, begin, middle)
             low, high = (middle, high) if (may_miss(budget, levels) <= room).all() else (low, middle - 1)
         levels, room = of_stage(seen, budget, begin, low)
-        room -= may_miss(budget, levels)
+        room -= may_miss(budget, levels).max(axis=0)
         first.append(begin)
         every.append(levels)
         begin = low
@@ -269,7 +269,7 @@ def _alarms(seen: AxisRoom, budget: Budget, leaving: int, missed: FloatArray) ->
     leave = [
         may_miss(budget, one) for one, end in zip(every, [*first[1:], samples], strict=True) if end > since
     ]
-    return AxisAlarms(first, np.array(every), np.max(leave, axis=0))
+    return AxisAlarms(first, np.array(every), np.max(leave, axis=(0, 1)))
 
 
 def _entries(before: ProvedTransition, conditions: AxisConditions, periods: int) -> list[Entry]:
