@@ -160,11 +160,11 @@ def _beyond(
         gain_set: The rule of the gains.
         budget: The budget.
     """
-    best, said = 0.0, _sentence(*tried[0])
+    best, said = 0.0, ""
     widest_first = sorted(tried, key=lambda one: -_narrowest_goal(one[0]))  # these bear most
     for plan, unproved in chain(widest_first, ((plan, tried[0][1]) for plan in others)):
         team = team_couplings(budget, problem.tree, plan.cells)
-        low, high, share = best, 1.0, best + SHARE_STEP if best > 0.0 else 0.5
+        low, high, share = best, 1.0, best + SHARE_STEP  # mostly cells that bear no more fail there
         while high - low > ROUNDED * SHARE_STEP:
             found = _fitted(problem, plan, gain_set, budget.scaled(share), team)
             if isinstance(found, Plan):
@@ -172,7 +172,7 @@ def _beyond(
             else:
                 high, unproved = share, found
             share = 0.5 * (low + high)
-        if low > best:
+        if low > best or not said:
             best, said = low, _sentence(plan, unproved)
         if _is_final(unproved):
             break
