@@ -156,6 +156,8 @@ def _with_clocks(
         return budget.age_error * float(stiff * found[2] + damped * found[4])
 
     noise = stiff * budget.position_noise + damped * budget.velocity_noise
+    if not budget.age_error:
+        return caused(noise)
     least = mistaken(caused(0.0))
     grows = mistaken(caused(1.0)) - least
     return caused((noise + least) / (1.0 - grows)) if grows < 1.0 else None
