@@ -17,7 +17,7 @@ from coop_drake.answers import PlanningProblem
 from coop_drake.answers.plan import MixedCell
 from coop_drake.diagnosis.contacts import BodyAtFault
 from coop_drake.diagnosis.diagnosing import BlockedPose, Diagnosis, PassageFindings, Relaxation
-from coop_drake.diagnosis.variants import Answer, BlockingPassage, Bracket, OpenFloor
+from coop_drake.diagnosis.variants import Answer, BlockingPassage, Bracket
 from coop_drake.drawing import draw_polygon, draw_workspace, new_figure, team_footprints
 from coop_drake.drawing.colours import AT_FAULT, BLUE, GREY, INK, NOT_AT_FAULT, OUTSIDE, PAPER, WALL
 from coop_drake.geometry.polygons import parts_of
@@ -93,8 +93,7 @@ def _passage_sentences(findings: PassageFindings) -> list[str]:
     widening, count = findings.widening, len(findings.passages)
     if widening.found is None:
         known = "proved not to be" if widening.is_refuted else "not found"
-        back = f"Moving every wall back by up to {widening.most:.3f} m was {known} enough."
-        return [back, *_open_floor_sentences(findings.open_floor)]
+        return [f"Moving every wall back by up to {widening.most:.3f} m was {known} enough."]
     if not count:
         refuted = f"; by {widening.refuted:.3f} m was proved too little" if widening.refuted else ""
         return [f"Moving every wall back by {widening.found:.3f} m was found enough{refuted}."]
@@ -105,18 +104,6 @@ def _passage_sentences(findings: PassageFindings) -> list[str]:
     known = "found" if findings.are_enough else "not found"
     these = "this passage" if count == 1 else f"these {count} passages"
     return [*sentences, f"Widening only {these} was {known} enough."]
-
-
-def _open_floor_sentences(floor: OpenFloor | None) -> list[str]:
-    if floor is None:
-        return []
-    if floor.answer is Answer.FOUND:
-        return ["Without any walls there is a path: the walls must move back by more than was tried."]
-    proved = floor.answer is Answer.INFEASIBLE
-    known = "It is proved that there is no path" if proved else "No path was found"
-    return [f"{known} even without walls: the bodies may be in each other's way."] + [
-        f"A path exists if {first} and {second} are allowed to overlap." for first, second in floor.pairs
-    ]
 
 
 def _where(passage: BlockingPassage) -> str:
@@ -199,10 +186,6 @@ def facts_of(diagnosis: Diagnosis) -> dict[str, Any]:
         facts["walls_moved_back_m"] = _bracket_facts(findings.widening)
         facts["way_sticks_out_m"] = findings.needed
         facts["widening_passages_is_enough"] = findings.are_enough
-        if findings.open_floor is not None:
-            pairs = [list(pair) for pair in findings.open_floor.pairs]
-            answer = findings.open_floor.answer.value
-            facts["without_walls"] = {"answer": answer, "pairs_in_the_way": pairs}
         facts["passages"] = [_passage_facts(passage) for passage in findings.passages]
     if goal is not None:
         facts["goal"] = {
