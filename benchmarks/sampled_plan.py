@@ -9,10 +9,18 @@ import numpy as np
 from coop_drake.answers.budget import Budget
 from coop_drake.answers.plan import Plan
 from coop_drake.jit import compiled
-from coop_drake.laws.axis_table import FADING_TIME, LEAVING_TIME, axis_table, bounds_of, rest_jump, track_row
+from coop_drake.laws.axis_table import (
+    FADING_TIME,
+    LEAVING_TIME,
+    axis_table,
+    bounds_of,
+    switch_jump,
+    track_row,
+)
+from coop_drake.laws.governor import governed_acceleration
 from coop_drake.laws.measurements import whole_periods
 from coop_drake.laws.nominal import carry_axes as carry_nominal
-from coop_drake.laws.nominal import lag_factors, pulled_axis
+from coop_drake.laws.nominal import lag_factors
 from coop_drake.laws.ppc import fading
 from coop_drake.laws.readiness import axis_ready
 from coop_drake.robustness.alarms import unseen_of
@@ -146,7 +154,7 @@ def pull_response(
     for k in range(samples - 1):
         u = 1.0 if k == 0 else 0.0
         if k >= delay:
-            u += loop[2] * pulled_axis(0.0, x[k - delay], v[k - delay], (0.0, 0.0), gains)
+            u += loop[2] * governed_acceleration(x[k - delay], v[k - delay], 0.0, gains[0], gains[1])
         gap = p - u
         x[k + 1] = x[k] + T * v[k] + 0.5 * T * T * u + in_x * gap
         v[k + 1] = v[k] + T * u + in_v * gap
@@ -226,7 +234,7 @@ def _carry(
             lower, upper = bounds_of(tables[cell, i], (k - entered) * T)[:2]
             rooms[k, 0, i], rooms[k, 1, i] = x[i] - lower, upper - x[i]
             following = tables[min(cell + 1, cells - 1), i]
-            rests = axis_ready(tables[cell, i], following, nominal[k, 0, i], nominal[k, 1, i]) >= 0.0
+            rests = min(axis_ready(tables[cell, i], following, nominal[k, 0, i], nominal[k, 1, i])) >= 0.0
             if rests and (k - entered) * T >= tables[cell, i, LEAVING_TIME] - 1e-9:
                 reported[i] = k
             ready = ready and k - reported[i] <= age
@@ -235,7 +243,8 @@ def _carry(
         if ready and cell + 1 < cells and (k - entered) * T > tables[cell, 0, LEAVING_TIME] + waits[cell]:
             old[:] = jumps
             for i in range(m):
-                jumps[i], reported[i] = rest_jump(tables[cell, i], tables[cell + 1, i]), -n
+                jumps[i] = switch_jump(tables[cell, i], tables[cell + 1, i], 0.0, 0.0, 0.0)
+                reported[i] = -n
             former, entered, cell = entered, k, cell + 1
         elif (k - entered) * T > SLOWEST:
             return -1.0, k + 1
@@ -248,7 +257,9 @@ def _carry(
             ago = max(k - delay, 0)
             seen = before[ago, i] + disturbances[k, i, :2]
             expected = nominal[ago, 0, i], nominal[ago, 1, i]
-            u = factors[i] * pulled_axis(law[i], seen[0], seen[1], expected, gains) + disturbances[k, i, 2]
+            away, fast = seen[0] - expected[0], seen[1] - expected[1]
+            pulled = law[i] + governed_acceleration(away, fast, 0.0, gains[0], gains[1])
+            u = factors[i] * pulled + disturbances[k, i, 2]
             for half in range(2):
                 t = 0.5 * T
                 left, in_v, in_x = lag_factors(t, lag)

@@ -7,7 +7,8 @@ from math import exp
 import numpy as np
 
 from coop_drake.jit import compiled
-from coop_drake.laws.nominal import nominal_flow, tracked_acceleration
+from coop_drake.laws.governor import governed_acceleration
+from coop_drake.laws.nominal import nominal_flow
 from coop_drake.robustness.position import PositionGains
 from coop_drake.tree.pose import FloatArray
 
@@ -37,7 +38,8 @@ def run_position(
         old = max(k - delay, 0)  # it was at rest before
         seen = motion[old, 0] + disturbances[k, 1], motion[old, 1] + disturbances[k, 2]
         expected = motion[old, 2], motion[old, 3]
-        u = tracked_acceleration(seen[0], seen[1], governor, (nominal, rate), expected, gains)
+        u = governed_acceleration(nominal, rate, governor, gains[0], gains[1])
+        u += governed_acceleration(seen[0] - expected[0], seen[1] - expected[1], 0.0, gains[2], gains[3])
         left = exp(-period / lag) if lag > 0.0 else 0.0
         gap, w, t = s - u, disturbances[k, 3], period
         x += t * v + factor * (0.5 * t * t * u + lag * (t - lag * (1.0 - left)) * gap) + 0.5 * t * t * w

@@ -7,7 +7,7 @@ from math import pi
 import numpy as np
 
 from coop_drake.jit import compiled
-from coop_drake.planning.sampling.collision import ObstacleGrid, is_free
+from coop_drake.planning.sampling.collision import ObstacleGrid, is_free_placed
 from coop_drake.tree.pose import FloatArray, IntArray
 from coop_drake.tree.team_arrays import TeamArrays
 
@@ -58,8 +58,9 @@ def _extend(
     length = np.sqrt(((way * scale) ** 2).sum())
     share = 1.0 if length <= reach else reach / length
     motions = max(1, int(np.ceil(np.abs(way * scale).max() * share / step)))
+    poses = np.empty((len(team.links), 5))
     for i in range(motions, 0, -1):
-        if not is_free(team, grid, nodes[near] + way * (share * i / motions), 0.0):
+        if not is_free_placed(team, grid, nodes[near] + way * (share * i / motions), 0.0, poses):
             return _TRAPPED, motions - i + 1
     nodes[count] = nodes[near] + way * share
     parents[count] = near

@@ -13,12 +13,13 @@ from coop_drake.compiled_loop.arrays import (
     RobotRoom,
     WatchRoom,
 )
-from coop_drake.compiled_loop.robots import compute, read_own
+from coop_drake.compiled_loop.robots import compute
 from coop_drake.compiled_loop.watching import ENDED, RUNS, left_by_all, watch
 from coop_drake.jit import compiled
 from coop_drake.laws.actuators import lag_behind, limit_efforts
 from coop_drake.laws.measurements import carry_reports, uniform_pair
 from coop_drake.laws.nominal import carry_axes
+from coop_drake.laws.robot_dynamics import read_robot
 from coop_drake.laws.team_dynamics import base_friction, stick, team_accelerations
 from coop_drake.systems.kernels import step_nominal
 from coop_drake.tree.pose import FloatArray
@@ -157,8 +158,9 @@ def advance(
                 limit, effort = plant.strongest[first + i], memory.efforts[1, own + 3 + i]
                 efforts[team.places[1, 3 + first + i] - n] = min(max(effort, -limit), limit)
             if floor[0] > 0.0 or floor[1] > 0.0:
-                yaw = team.yaws[k]
-                read_own(k, team.places, team.first, team.base_chains, yaw, room.motion, state, room.robot)
+                joints = team.places[:, 3 + first : 3 + team.first[2, k + 1]]
+                base = team.base_chains[team.first[1, k] : team.first[1, k + 1]]
+                read_robot(base, team.yaws[k], joints, room.motion, state, room.robot)
                 rates = 3 + team.first[2, k + 1] - first
                 fx, fy = base_friction(room.robot[rates], room.robot[rates + 1], floor[0], floor[1])
                 wrenches[k, 0] += fx

@@ -21,19 +21,18 @@ from coop_drake.compiled_loop.arrays import (
 )
 from coop_drake.jit import compiled
 from coop_drake.laws.axis_table import track_axes, write_jumps
-from coop_drake.laws.measurements import NOTHING, carry_measurements, shift_back, uniform_pair, write_errors
-from coop_drake.laws.nominal import carry_axes, place_on_axes, pull_axes
+from coop_drake.laws.measurements import NOTHING, carry_measurements, uniform_pair, write_errors
+from coop_drake.laws.nominal import carry_axes, place_on_axes, pull_axes, track_nominal
 from coop_drake.laws.readiness import (
+    FAR,
+    QUIET,
     alarm_at,
-    alarm_stage,
     arrival_margin,
     clearance_margin,
     largest_departure,
-    quiet_margin,
 )
 from coop_drake.laws.robot_dynamics import end_effector_command, estimate_object, read_robot, robot_effort
 from coop_drake.systems.kernels import (
-    accelerate_along,
     axes_ready,
     cell_margin,
     govern,
@@ -41,7 +40,7 @@ from coop_drake.systems.kernels import (
     robot_arrived,
     show_nominal,
 )
-from coop_drake.tree.pose import FloatArray, IntArray
+from coop_drake.tree.pose import FloatArray
 
 LOST_POSE, POSE_NOISE = 1, 5
 """Uses of seeds: losses and noise of measured poses; those of measured states are the next ones."""
@@ -86,7 +85,9 @@ def compute(
         pose, robot = memory.poses[taken, k], memory.states[taken, 2 * own : 2 * own + size]
         for i in range(3):
             pose[i] = memory.state[team.places[0, i]] + departures.biases[k, i]
-        read_own(k, team.places, first, team.base_chains, team.yaws[k], room.motion, memory.state, robot)
+        joints = team.places[:, 3 + first[2, k] : 3 + first[2, k + 1]]
+        base = team.base_chains[first[1, k] : first[1, k + 1]]
+        read_robot(base, team.yaws[k], joints, room.motion, memory.state, robot)
         for i in range(size // 2, size // 2 + 3):
             robot[i] *= departures.odometry[k]
         seed, shift, sizes = departures.seeds[k, POSE_NOISE], departures.shifts[k], departures.errors
@@ -105,6 +106,8 @@ def compute(
             seed = departures.seeds[k, LOST_POSE + 1]
             _pass(sample, number, seed, lossy, room.line, memory.lines[k, 1], robot)
         estimate_object(chain, load[:2], room.motion, robot, pose, seen)
+        if nominal.levels.size:
+            _monitor(k, sample, now, team, nominal, departures, memory, room, robot)
 
         # The desired acceleration of the object's origin, and p_G'.
         cell, time = heard_cell(k, sample, now, departures.hearing, memory.current)
@@ -112,7 +115,7 @@ def compute(
         governed, linear, governor = room.governed, room.governed[2:], memory.governors[k]
         if nominal.flow.size:
             governed[0], governed[1], governor = 0.0, 0.0, led[4:6]
-            accelerate_along(team.tracking, seen, governor, led, led_then, linear)
+            track_nominal(team.tracking, seen, governor, led, led_then, linear)
         else:
             flat = cells.flats[cells.first[2, cell] : cells.first[2, cell + 1]]
             field = cells.fields[cells.first[3, cell] : cells.first[3, cell + 1]]
@@ -128,11 +131,18 @@ def compute(
             axes = memory.axes[sample % memory.axes.shape[0], :, begin:end]
             then = memory.axes[seen_at % memory.axes.shape[0], :2, begin:end]
             led_robot, later = room.robots[1, :size], room.later[:, begin:end]
-            _place(axes, mounting, seen, robot, room.seen[1], led_robot)
+            for row in range(1, 3):
+                for i in range(6):
+                    room.seen[row, i] = seen[i]
+                for i in range(size):
+                    room.robots[row, i] = robot[i]
+            room.seen[1, 2], room.seen[1, 5] = axes[0, 0], axes[1, 0]
+            place_on_axes(axes, mounting, led_robot)
             track_axes(table, time, ON_TIME, jumps, room.seen[1], led_robot, law)
             pull_axes(law, seen, robot, then, (gains[0], gains[1]), room.pulled[begin:end])
             carry_axes(axes, law, 0.5 * period + gains[2], gains[2], later)
-            _place(later, mounting, seen, robot, room.seen[2], room.robots[2, :size])
+            room.seen[2, 2], room.seen[2, 5] = later[0, 0], later[1, 0]
+            place_on_axes(later, mounting, room.robots[2, :size])
         else:
             track_axes(table, time, ON_TIME, jumps, seen, robot, law)
         asked = room.pulled[begin:end] if axes_led else law
@@ -165,12 +175,11 @@ def compute(
                     show_nominal(edges, own_stiffness, target, period, periods, speed, led, room.shown)
                     at_position = nominal_ready(following, stiffness, room.shown, governor)
                 else:
-                    energy = cell_margin(following, stiffness, judged, governor)
+                    energy, _ = cell_margin(following, stiffness, judged, governor)
                     at_position = clearance_margin(energy, stiffness, cells.numbers[cell, 0])
                 margin = min(at_position, margin)
-        if nominal.levels.size:
-            _monitor(k, sample, now, team, nominal, departures, memory, room, robot)
-            margin = quiet_margin(margin, memory.alarms[k, 0])
+        if nominal.levels.size and memory.alarms[k, 0] != QUIET:
+            margin = min(margin, FAR)
         memory.reports[0, k, 0], memory.reports[0, k, 1] = cell, margin
         if margin >= 0.0 and cell < last_cell:  # The next cell may begin now.
             after, own_jumps = cells.tables[cell + 1, begin:end], memory.jumps[begin:end]
@@ -181,21 +190,13 @@ def compute(
 
 
 @compiled(borrows=True)
-def read_own(
-    k: int, places: IntArray, first: IntArray, base_chains: FloatArray, yaw: float, motion: FloatArray,
-    state: FloatArray, robot: FloatArray,
-) -> None:  # fmt: skip
-    """Write (z_k, z_k') of robot k, see ``read_robot``; ``motion`` is room for the longest chain's motion."""
-    joints = places[:, 3 + first[2, k] : 3 + first[2, k + 1]]
-    read_robot(base_chains[first[1, k] : first[1, k + 1]], yaw, joints, motion, state, robot)
-
-
-@compiled(borrows=True)
 def _err(
     sample: int, first: int, shift: float, exact: FloatArray, seed: int, number: int, sizes: FloatArray,
     errors: FloatArray, values: FloatArray,
 ) -> None:  # fmt: skip
     """Replace what there is to measure by what is measured: at another time by a wrong clock, with errors.
+
+    Between two samples, and as much beyond, motions are taken for uniform, see ``ShiftedMeasurement``.
 
     Args:
         sample: Number of the sample.
@@ -214,7 +215,8 @@ def _err(
             there[first + i] = values[i]
             if sample == 0:
                 before[first + i] = values[i]
-        shift_back(values, before[first : first + values.size], shift)
+        for i in range(values.size):
+            values[i] -= shift * (values[i] - before[first + i])
     largest = 0.0
     for i in range(values.size):
         largest = max(largest, sizes[i, 0], sizes[i, 1])
@@ -280,20 +282,6 @@ def heard_cell(
     return int(entered[0]), now - (entered[1] - hearing[0, k])
 
 
-@compiled(borrows=True)
-def _place(
-    axes: FloatArray, mounting: FloatArray, seen: FloatArray, robot: FloatArray, led: FloatArray,
-    led_robot: FloatArray,
-) -> None:  # fmt: skip
-    """Write the states of object and robot with the angles and rates of their nominal axes."""
-    for i in range(6):
-        led[i] = seen[i]
-    for i in range(robot.size):
-        led_robot[i] = robot[i]
-    led[2], led[5] = axes[0, 0], axes[1, 0]
-    place_on_axes(axes, mounting, led_robot)
-
-
 @compiled(inlined=True, borrows=True)
 def _monitor(
     k: int, sample: int, now: float, team: LoopTeam, nominal: LoopNominal, departures: LoopDepartures,
@@ -309,7 +297,7 @@ def _monitor(
         nominal: The nominal motions.
         departures: What departs.
         memory: What changes.
-        room: Holds the object's state as the robot measures it.
+        room: Holds the object's state as the robot measures it, and the motion of its chain then.
         robot: Its own, shape (2 (3 + n_k),).
     """
     begin, size = k + team.first[2, k], 1 + team.first[2, k + 1] - team.first[2, k]
@@ -318,14 +306,13 @@ def _monitor(
     axes = memory.axes[made % memory.axes.shape[0], :2, begin : begin + own]
     then = made * departures.times[0] if age else now
     cell, time = heard_cell(k, made, then, departures.hearing, memory.current)
-    stage = alarm_stage(nominal.alarm_times[cell], time)
-    levels = nominal.axis_alarms[cell, stage, :, begin : begin + own]
+    levels = nominal.axis_alarms[cell, :, :, begin : begin + own]
     led, alarms = memory.nominal[made % memory.nominal.shape[0]], memory.alarms[k]
-    chain = team.chains[team.first[0, k] : team.first[0, k + 1]]
+    hand = room.motion[team.first[0, k + 1] - team.first[0, k] - 1]
     mounting = nominal.mountings[begin : begin + size]
     share, which = largest_departure(
-        chain, team.loads[k], mounting, room.motion, robot, room.seen[0], led, axes, nominal.levels, levels,
-        nominal.unseen,
+        team.loads[k], mounting, hand, robot, room.seen[0], led, axes, nominal.levels,
+        nominal.alarm_times[cell], levels, time, nominal.unseen,
     )  # fmt: skip
     alarms[0], alarms[1], alarms[2] = alarm_at(share, now, alarms[3]), share, which
     if share > 1.0:

@@ -7,7 +7,7 @@ only where it can be the smallest so far.
 
 from __future__ import annotations
 
-from math import hypot, inf, isnan
+from math import hypot, inf
 
 import numpy as np
 
@@ -110,12 +110,12 @@ def watch(
     """
     z, entered, before = room.z, memory.current[sample % memory.current.shape[0]], room.before
     now, cell, robots, asked, most = sample * departures.times[0], int(entered[0]), team.yaws.size, False, 0
-    figures[SAMPLES], figures[CELL] = sample, cell
+    figures[SAMPLES], figures[CELL], used = sample, cell, -inf
     for i in range(z.size):
         z[i] = memory.state[team.places[0, i]]
 
-    # Distances of axes to funnels and slices. One uses the least distance to its funnel's bounds that the
-    # budget states over the one that it keeps.
+    # Distances of axes to funnels and slices. What one uses of the budget is the least distance to its
+    # funnel's bounds that the budget states, over the one that it keeps.
     for i in range(z.size - 2):
         heard, time = heard_cell(plant.axis_rows[1, i], sample, now, departures.hearing, memory.current)
         bounds = bounds_of(cells.tables[heard, plant.axis_rows[0, i]], time)
@@ -125,7 +125,7 @@ def watch(
         if not margin > 0.0:
             end(figures, OUT_OF_FUNNEL, margin, i)
         if nominal.distances.size:
-            _use(nominal.distances[0, cell, i] / margin if margin > 0.0 else inf, figures)
+            used = max(used, nominal.distances[0, cell, i] / margin if margin > 0.0 else inf)
         lower, upper = cells.slices[0, cell, i], cells.slices[1, cell, i]
         margin = min(z[2 + i] - lower, upper - z[2 + i])
         if not margin > 0.0:
@@ -177,14 +177,16 @@ def watch(
     if nominal.flow.size:
         led = memory.nominal[sample % memory.nominal.shape[0]]
         vx, vy = memory.state[team.places[1, 0]], memory.state[team.places[1, 1]]
-        _use(hypot(z[0] - led[0], z[1] - led[1]) / nominal.position[2], figures)
-        _use(hypot(vx - led[2], vy - led[3]) / nominal.position[3], figures)
+        used = max(used, hypot(z[0] - led[0], z[1] - led[1]) / nominal.position[2])
+        used = max(used, hypot(vx - led[2], vy - led[3]) / nominal.position[3])
         if nominal.distances.size:
             axes = memory.axes[sample % memory.axes.shape[0]]
             for i in range(z.size - 2):
                 row, rate = plant.axis_rows[0, i], memory.state[team.places[1, 2 + i]]
-                _use(abs(z[2 + i] - axes[0, row]) / nominal.distances[1, cell, i], figures)
-                _use(abs(rate - axes[1, row]) / nominal.distances[2, cell, i], figures)
+                used = max(used, abs(z[2 + i] - axes[0, row]) / nominal.distances[1, cell, i])
+                used = max(used, abs(rate - axes[1, row]) / nominal.distances[2, cell, i])
+    if used >= 0.0 and not figures[SHARE] > used:
+        figures[SHARE] = used
 
     # Efforts of all robots, the object's rotation, and what the robots' monitors say: the run ends where one
     # asks for a hold, which this loop lacks, and the robot is named that departs most.
@@ -231,13 +233,6 @@ def watch(
         end(figures, STALLED, time)
     elif now >= departures.times[1]:
         end(figures, LATE, time)
-
-
-@compiled(borrows=True)
-def _use(share: float, figures: FloatArray) -> None:
-    """Note which share was used of what the plan's budget states."""
-    if isnan(figures[SHARE]) or share > figures[SHARE]:
-        figures[SHARE] = share
 
 
 @compiled(borrows=True)

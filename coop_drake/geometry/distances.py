@@ -67,8 +67,8 @@ def meets_ring(
 ) -> bool:
     """Whether the segment a-b meets a ring of two or more vertices or what it encloses; False for a point.
 
-    The segment is clipped by the half-plane of every edge. The ring is rows first to last - 1 of the
-    vertices, shape (V, 2) [m].
+    The segment is clipped by the half-plane of every edge; of length zero it is met where the ring has an
+    interior that holds the point. The ring is rows first to last - 1 of the vertices, shape (V, 2) [m].
     """
     if last - first == 1:
         return False
@@ -110,19 +110,6 @@ def squared_ring_distance(
         best = min(best, squared_distance(ax, ay, ux, uy, wx, wy))
         best = min(best, squared_distance(bx, by, ux, uy, wx, wy))
     return best
-
-
-@compiled(borrows=True)
-def ring_holds(vertices: FloatArray, first: int, last: int, x: float, y: float) -> bool:
-    """Whether a ring of three or more vertices encloses a point; see ``meets_ring`` for the arguments."""
-    if last - first < 3:
-        return False
-    before = last - 1
-    for k in range(first, last):
-        if twice_area(vertices[before, 0], vertices[before, 1], vertices[k, 0], vertices[k, 1], x, y) < 0.0:
-            return False
-        before = k
-    return True
 
 
 @compiled(borrows=True)

@@ -243,11 +243,13 @@ def over_prismatic(vertices: FloatArray, x0: float, y0: float, x1: float, y1: fl
 
 @compiled
 def grown(vertices: FloatArray, radius: float, largest_turn: float) -> FloatArray:
-    """Enclose a convex set grown by a radius [m] in a polygon.
+    """Enclose a convex set grown by a radius [m] in a polygon; it is the set itself where that is zero.
 
     The set is a convex ring, one point or a segment, shape (n, 2) [m]; neighbouring normals of the polygon
     are at most ``largest_turn`` apart [rad].
     """
+    if radius == 0.0:
+        return vertices
     directions = closed_directions(edge_directions(vertices), largest_turn)
     offsets = support(vertices, directions)
     for k in range(len(offsets)):
@@ -339,7 +341,6 @@ def shrunk(vertices: FloatArray, distance: float) -> FloatArray:
     return found
 
 
-@compiled
 def under_revolute(vertices: FloatArray, centre: float, half_width: float) -> FloatArray:
     """Find points that a convex polygon covers at every angle of an interval about the origin.
 
@@ -357,22 +358,16 @@ def under_revolute(vertices: FloatArray, centre: float, half_width: float) -> Fl
     half_width = min(half_width, pi)  # A joint of many turns covers no more; its chords would leap over arcs.
     edges = edge_directions(vertices)
     offsets = support(vertices, edges)
+    round_pivot = offsets > 0.0
+    if half_width >= 0.5 * pi and not round_pivot.all():
+        return np.empty((0, 2))
     parts = arc_parts(half_width)
     half_chord = half_width / parts
-    angles, distances = np.empty(len(edges) * (2 + parts)), np.empty(len(edges) * (2 + parts))
-    size = 0
-    for i in range(len(edges)):
-        angle, offset = edges[i], offsets[i]
-        if offset <= 0.0 and half_width >= 0.5 * pi:
-            return np.empty((0, 2))
-        for side in (-1.0, 1.0):
-            angles[size], distances[size] = centre + angle + side * half_width, offset
-            size += 1
-        for part in range(parts if offset > 0.0 else 0):
-            angles[size] = centre + angle + half_chord * (2.0 * part + 1.0 - parts)
-            distances[size] = offset * cos(half_chord)
-            size += 1
-    return half_planes_polygon(angles[:size], distances[:size])
+    chords = half_chord * (2.0 * np.arange(parts) + 1.0 - parts)
+    angles = (centre + edges, centre + edges[round_pivot])
+    turned = (angles[0] - half_width, angles[0] + half_width, np.add.outer(angles[1], chords).ravel())
+    distances = (offsets, offsets, np.repeat(offsets[round_pivot] * cos(half_chord), parts))
+    return half_planes_polygon(np.concatenate(turned), np.concatenate(distances))
 
 
 def under_prismatic(vertices: FloatArray, x0: float, y0: float, x1: float, y1: float) -> FloatArray:
@@ -389,7 +384,6 @@ def under_prismatic(vertices: FloatArray, x0: float, y0: float, x1: float, y1: f
     return half_planes_polygon(angles, offsets)
 
 
-@compiled
 def common_disc(centres: FloatArray, radius: float, largest_turn: float) -> FloatArray:
     """Polygon inside every disc of one radius [m] whose centre lies in a convex polygon, shape (n, 2) [m].
 
@@ -397,25 +391,17 @@ def common_disc(centres: FloatArray, radius: float, largest_turn: float) -> Floa
     the common part at the nearest exit. Neighbouring vertices of the result are ``largest_turn`` apart [rad];
     it has no rows where the discs have no common part.
     """
-    low_x, low_y, high_x, high_y = np.inf, np.inf, -np.inf, -np.inf
-    for i in range(len(centres)):
-        low_x, high_x = min(low_x, centres[i, 0]), max(high_x, centres[i, 0])
-        low_y, high_y = min(low_y, centres[i, 1]), max(high_y, centres[i, 1])
-    x, y = 0.5 * (low_x + high_x), 0.5 * (low_y + high_y)
-    directions = closed_directions(np.empty(0), largest_turn)
-    ring = np.empty((len(directions), 2))
-    for k in range(len(directions)):
-        u, v = cos(directions[k]), sin(directions[k])
-        reach = np.inf
-        for i in range(len(centres)):
-            dx, dy = x - centres[i, 0], y - centres[i, 1]
-            beyond = radius * radius - dx * dx - dy * dy
-            if beyond <= 0.0:
-                return np.empty((0, 2))
-            along = u * dx + v * dy
-            reach = min(reach, sqrt(along * along + beyond) - along)
-        reach *= 1.0 - 1e-9
-        ring[k, 0], ring[k, 1] = x + reach * u, y + reach * v
+    middle = 0.5 * (centres.min(axis=0) + centres.max(axis=0))
+    off = middle - centres
+    beyond = radius * radius - off[:, 0] * off[:, 0] - off[:, 1] * off[:, 1]
+    if beyond.min() <= 0.0:
+        return np.empty((0, 2))
+    directions = np.array(
+        [(cos(angle), sin(angle)) for angle in closed_directions(np.empty(0), largest_turn)]
+    )
+    along = np.multiply.outer(directions[:, 0], off[:, 0]) + np.multiply.outer(directions[:, 1], off[:, 1])
+    reach = (np.sqrt(along * along + beyond) - along).min(axis=1) * (1.0 - 1e-9)
+    ring: FloatArray = middle + reach[:, None] * directions
     return ring
 
 
@@ -478,21 +464,4 @@ def over_piece(
         widest = max(widest, upper[axis] - lower[axis])
         ring = over_joint(team, link, ring, lower, upper)
         link, stages = team.links[link, 0], stages - 1
-    return rounded_sweep(team, piece, ring, widest) if rounded else ring
-
-
-@compiled
-def rounded_sweep(team: TeamArrays, piece: int, ring: FloatArray, widest: float) -> FloatArray:
-    """Grow the sweep of a piece's vertices by its radius.
-
-    Args:
-        team: The team.
-        piece: Index of the piece.
-        ring: The sweep, shape (n, 2) [m].
-        widest: Width of the widest interval that it was swept through [rad or m].
-
-    Returns:
-        Vertices, shape (m, 2) [m].
-    """
-    radius = team.radii[piece]
-    return grown(ring, radius, disc_turn(0.5 * widest)) if radius > 0.0 else ring
+    return grown(ring, team.radii[piece], disc_turn(0.5 * widest)) if rounded else ring

@@ -34,10 +34,10 @@ from coop_drake.harmonic_maps.evaluate import (
     FlatMap,
     MapArrays,
     add_to_series,
+    among_walls,
     far_field,
     flatten,
     integer,
-    is_inside,
     leaf_at,
     length_of,
     panel_ends,
@@ -432,8 +432,8 @@ def _sort_out(
             if (k != own or k < 0) and seen_from(m, k, place, level, x, y)[2] < radius:
                 gain[box] += 1 if place >= 0 else _CORNER
         if state[box] == ON_BOUNDARY and nearest > radius:
-            walls = length_of(m, EDGES, 0)
-            state[box] = INSIDE if is_inside(m, row(m, EDGES, 0, 4), walls, x, y) else OUTSIDE
+            inside, _, _ = among_walls(m, row(m, EDGES, 0, 4), length_of(m, EDGES, 0), x, y)
+            state[box] = INSIDE if inside else OUTSIDE
         if state[box] == OUTSIDE:  # no point is ever looked for there
             end, gain[box] = first[box], 0
         first[box + 1] = end

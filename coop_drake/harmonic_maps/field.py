@@ -12,7 +12,7 @@ from shapely import Point
 
 from coop_drake.errors import FieldError
 from coop_drake.geometry.polygons import edges_of, extent_of
-from coop_drake.harmonic_maps.evaluate import FlatMap, evaluate_one, is_inside, nearest_on_walls
+from coop_drake.harmonic_maps.evaluate import FlatMap, among_walls, evaluate_one
 from coop_drake.harmonic_maps.harmonic_map import HarmonicMap
 from coop_drake.harmonic_maps.outline import as_points
 from coop_drake.jit import compiled
@@ -93,7 +93,8 @@ class VelocityField:
             FieldError: If the points have another shape or are not finite.
         """
         p = as_points(points)
-        return _velocities_in_field(self._map, self._field, p.reshape(-1, 2)).reshape(p.shape)
+        known, places = self.kernel_arguments, p.reshape(-1, 2).tolist()
+        return np.array([velocity_in_field(*known, x, y) for x, y in places]).reshape(p.shape)
 
     @property
     def kernel_arguments(self) -> tuple[FlatMap, FloatArray]:
@@ -111,9 +112,9 @@ def velocity_in_field(flat: FlatMap, field: FloatArray, x: float, y: float) -> t
     """
     x, y = x - flat[0], y - flat[1]
     radius, max_speed, edges = field[0], field[1], (len(field) - _EDGES) // 4
-    gx, gy = nearest_on_walls(field, _EDGES, edges, x, y)
+    arrived, gx, gy = among_walls(field, _EDGES, edges, x, y)
     remaining = np.sqrt((gx - x) ** 2 + (gy - y) ** 2)
-    if remaining == 0.0 or is_inside(field, _EDGES, edges, x, y):
+    if remaining == 0.0 or arrived:
         return 0.0, 0.0
     if edges == 1 and remaining < _STRAIGHT * radius:
         dx, dy = gx - x, gy - y
@@ -126,15 +127,6 @@ def velocity_in_field(flat: FlatMap, field: FloatArray, x: float, y: float) -> t
         return 0.0, 0.0
     speed = max_speed * min(1.0, remaining / radius)
     return speed * dx / norm, speed * dy / norm
-
-
-@compiled
-def _velocities_in_field(flat: FlatMap, field: FloatArray, points: FloatArray) -> FloatArray:
-    """Velocities at many points of W, shape (n, 2) [m] -> (n, 2) [m/s]."""
-    velocities = np.empty((len(points), 2))
-    for i in range(len(points)):
-        velocities[i, 0], velocities[i, 1] = velocity_in_field(flat, field, points[i, 0], points[i, 1])
-    return velocities
 
 
 def direction_error(harmonic_map: HarmonicMap, points: FloatArray, distance: FloatArray) -> FloatArray:

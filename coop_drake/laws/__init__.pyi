@@ -9,7 +9,7 @@ from .governor import (
 )
 from .ppc import Funnel, FunnelBounds, funnel_bounds
 from .readiness import clearance_margin, interval_margin
-from .robot_dynamics import acceleration_at, object_twist, total_wrench, wrench_share
+from .robot_dynamics import acceleration_at, total_wrench, wrench_share
 
 __all__ = [
     "FixedGains",
@@ -26,7 +26,6 @@ __all__ = [
     "governed_acceleration",
     "governor_velocity",
     "interval_margin",
-    "object_twist",
     "slowdown_radius",
     "total_wrench",
     "tracking_energy",

@@ -13,7 +13,6 @@ from coop_drake.laws.ppc import (
     axis_bounds,
     fading,
     ramped_gain,
-    slowed_bounds,
     speed_damping,
     track_axis,
 )
@@ -98,10 +97,20 @@ def bounds_of(row: FloatArray, time: float) -> tuple[float, float, float, float,
 
 
 @compiled(borrows=True)
+def gains_of(row: FloatArray, time: float) -> tuple[float, float, float, float, float]:
+    """Return the gains of one axis as ``track_axis`` takes them: kappa, k1, k1', k2 and the saturation."""
+    k1, k1_dot = ramped_gain(time, row[POSITION_GAIN], row[RAMP_RATE])
+    return row[LOG_GAIN], k1, k1_dot, row[RATE_GAIN], row[SATURATION]
+
+
+@compiled(borrows=True)
 def track_row(
     row: FloatArray, time: float, position: float, rate: float, pace: float = 1.0, pace_rate: float = 0.0
 ) -> tuple[float, float]:
     """Return ``track_axis`` of one axis from its row, whose funnel moves by a clock that may slow down.
+
+    With tau' = ``pace`` and tau'' = ``pace_rate``, a bound rho(tau) has the rate rho' tau' and the
+    acceleration rho'' tau'^2 + rho' tau''.
 
     Args:
         row: The axis, shape (``LAW_COLUMNS``,).
@@ -111,9 +120,14 @@ def track_row(
         pace: tau' [-].
         pace_rate: tau'' [1/s].
     """
-    k1, k1_dot = ramped_gain(time, row[POSITION_GAIN], row[RAMP_RATE])
-    gains = row[LOG_GAIN], k1, k1_dot * pace, row[RATE_GAIN], row[SATURATION]
-    return track_axis(position, rate, slowed_bounds(bounds_of(row, time), pace, pace_rate), gains)
+    lower, upper, lower_rate, upper_rate, lower_acceleration, upper_acceleration = bounds_of(row, time)
+    kappa, k1, k1_dot, k2, saturation = gains_of(row, time)
+    bounds = (
+        lower, upper, lower_rate * pace, upper_rate * pace,
+        lower_acceleration * pace * pace + lower_rate * pace_rate,
+        upper_acceleration * pace * pace + upper_rate * pace_rate,
+    )  # fmt: skip
+    return track_axis(position, rate, bounds, (kappa, k1, k1_dot * pace, k2, saturation))
 
 
 def funnel_acceleration(
@@ -160,8 +174,10 @@ def track_axes(
     """
     n, left = table.shape[0] - 1, fading(time, table[0, FADING_TIME])
     for i in range(1 + n):
-        rate = object_state[5] if i == 0 else robot[5 + n + i]
-        asked = _acceleration(i, table, time, clock, object_state, robot) + left * jumps[i]
+        x, rate = object_state[2], object_state[5]
+        if i > 0:
+            x, rate = robot[2 + i], robot[5 + n + i]
+        asked = track_row(table[i], time - clock[0], x, rate, clock[1], clock[2])[0] + left * jumps[i]
         acceleration[i] = limited_row(table[i], asked, rate)
 
 
@@ -183,17 +199,6 @@ def limited_row(row: FloatArray, acceleration: float, rate: float) -> float:
 
 
 @compiled(borrows=True)
-def _acceleration(
-    i: int, table: FloatArray, time: float, clock: FloatArray, object_state: FloatArray, robot: FloatArray
-) -> float:
-    """Return what the funnels' law asks of axis i, without jumps and limits; arguments of ``track_axes``."""
-    x, v = object_state[2], object_state[5]
-    if i > 0:
-        x, v = robot[2 + i], robot[4 + table.shape[0] + i]
-    return track_row(table[i], time - clock[0], x, v, clock[1], clock[2])[0]
-
-
-@compiled(borrows=True)
 def write_jumps(
     table: FloatArray,
     next_table: FloatArray,
@@ -205,8 +210,7 @@ def write_jumps(
 ) -> None:
     """Write by how much the accelerations of ``track_axes`` would jump if the next cell were entered now.
 
-    Of an axis that leaves the cell at rest it is ``rest_jump``. Limits do not count:
-    they are the same in all cells, and act on the sum of law and fading jump.
+    Limits do not count: they are the same in all cells, and act on the sum of law and fading jump.
 
     Args:
         table: The axes in the current cell, whose hand-over is over, shape (1 + n, ``LAW_COLUMNS``).
@@ -217,26 +221,38 @@ def write_jumps(
         robot: (z_k, z_k'), shape (2 (3 + n),); not read where the robot has no joints.
         jumps: Receives the law of the current cell less that of the next, shape (1 + n,).
     """
-    for i in range(table.shape[0]):
-        if table[i, REST_RATE] > 0.0:
-            jumps[i] = rest_jump(table[i], next_table[i])
-        else:
-            now = _acceleration(i, table, time, clock, object_state, robot)
-            jumps[i] = now - _acceleration(i, next_table, clock[0], clock, object_state, robot)
+    n = table.shape[0] - 1
+    for i in range(1 + n):
+        x, rate = object_state[2], object_state[5]
+        if i > 0:
+            x, rate = robot[2 + i], robot[5 + n + i]
+        jumps[i] = switch_jump(table[i], next_table[i], time - clock[0], x, rate, clock[1], clock[2])
 
 
 @compiled(borrows=True)
-def rest_jump(row: FloatArray, next_row: FloatArray) -> float:
-    """Return by how much the acceleration jumps if the next cell is entered at rest [rad/s^2 or m/s^2].
+def switch_jump(
+    row: FloatArray, next_row: FloatArray, time: float, position: float, rate: float,
+    pace: float = 1.0, pace_rate: float = 0.0,
+) -> float:  # fmt: skip
+    """Return by how much the acceleration of an axis jumps if the next cell is entered [rad/s^2 or m/s^2].
 
-    The axis then rests in the middle of its goal interval, where the law of its cell asks for none. The
-    number follows from the plan alone: no error of a measurement fades with it, and all robots have the same.
+    It is the law of its cell less that of the next one. An axis that leaves its cell at rest is then in the
+    middle of its goal interval, where the law of its cell asks for none. The number follows from the plan
+    alone: no error of a measurement fades with it, and all robots have the same.
 
     Args:
         row: The axis in its cell, a row of an ``axis_table``.
         next_row: The axis in the next cell.
+        time: With the next four as in ``track_row``; of an axis that leaves at rest they are not read.
+        position: x [rad or m].
+        rate: x' [rad/s or m/s].
+        pace: tau' [-].
+        pace_rate: tau'' [1/s].
     """
-    return -track_row(next_row, 0.0, 0.5 * (row[GOAL_LOWER] + row[GOAL_UPPER]), 0.0)[0]
+    if row[REST_RATE] > 0.0:
+        return -track_row(next_row, 0.0, 0.5 * (row[GOAL_LOWER] + row[GOAL_UPPER]), 0.0)[0]
+    now = track_row(row, time, position, rate, pace, pace_rate)[0]
+    return now - track_row(next_row, 0.0, position, rate, pace, pace_rate)[0]
 
 
 def first_jumps(table: FloatArray, start: FloatArray | None) -> FloatArray:
@@ -251,7 +267,6 @@ def first_jumps(table: FloatArray, start: FloatArray | None) -> FloatArray:
     return np.array([-track_row(row, 0.0, x, 0.0)[0] for row, x in zip(table, start, strict=True)])
 
 
-@compiled(borrows=True)
 def write_bounds(table: FloatArray, time: float, bounds: FloatArray) -> None:
     """Write the lower, then the upper funnel bounds of all axes, shape (2 m,) [rad or m]."""
     m = table.shape[0]
@@ -272,7 +287,6 @@ def write_bounds(table: FloatArray, time: float, bounds: FloatArray) -> None:
 # q)) and sinh s = (2 q - 1) / (2 q (1 - q)).
 
 
-@compiled(borrows=True)
 def slope_bounds(
     row: FloatArray, time: float, position: float, reach: float, rate: float
 ) -> tuple[float, float, float, float]:
@@ -288,22 +302,9 @@ def slope_bounds(
     bounds, gains = bounds_of(row, time), gains_of(row, time)
     w, lower = bounds[1] - bounds[0], bounds[0]
     first, last = (position - reach - lower) / w, (position + reach - lower) / w
-    low, high = saturated(first, gains[4]), saturated(last, gains[4])
+    low, high = (min(max(place, gains[4]), 1.0 - gains[4]) for place in (first, last))
     ends = (first, low, log(low / (1.0 - low))), (last, high, log(high / (1.0 - high)))
     return slopes_between(bounds, gains, ends[0], ends[1], rate)
-
-
-@compiled(borrows=True)
-def gains_of(row: FloatArray, time: float) -> tuple[float, float, float, float, float]:
-    """Return the gains of one axis as ``track_axis`` takes them: kappa, k1, k1', k2 and the saturation."""
-    k1, k1_dot = ramped_gain(time, row[POSITION_GAIN], row[RAMP_RATE])
-    return row[LOG_GAIN], k1, k1_dot, row[RATE_GAIN], row[SATURATION]
-
-
-@compiled
-def saturated(place: float, saturation: float) -> float:
-    """Return the place dl / w in a funnel, one that is too near to a bound or outside being moved inside."""
-    return min(max(place, saturation), 1.0 - saturation)
 
 
 @compiled(borrows=True)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from coop_drake.jit import compiled
 from coop_drake.laws.ppc import (
     CLOSING,
-    STEEPEST,
+    PEAK_RATE,
     FunnelShape,
     axis_bounds,
     check_intervals,
@@ -300,9 +300,6 @@ GainSet = Annotated[FixedGains | ScheduledGains, TAGGED]
 PEAK = 10.0 / sqrt(3.0) / CLOSING**2
 """Largest acceleration of a quintic bound over lambda^2 times the distance that it moves [-]: 10 / sqrt(3) is
 the largest second derivative of the quintic over u."""
-
-PEAK_RATE = STEEPEST / CLOSING
-"""Largest rate of a quintic bound over lambda times the distance that it moves [-]."""
 
 ACCELERATION_SHARE = 0.4
 """Share of an acceleration limit that bounds, the log term at rest and the rate at entry take each [-]."""

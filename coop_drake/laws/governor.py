@@ -97,24 +97,6 @@ def energy_margin(energy: float, clearance: float, stiffness: float) -> float:
     return 0.5 * stiffness * clearance * abs(clearance) - energy
 
 
-@compiled(borrows=True)
-def object_energy_margin(
-    object_state: FloatArray, governor_position: FloatArray, clearance: float, stiffness: float
-) -> float:
-    """Return Delta E of (15) as robots compute it, from velocities in steps of ``VELOCITY_STEP``.
-
-    Args:
-        object_state: Pose and twist of the object in W, shape (6,).
-        governor_position: p_G in W, shape (2,) [m].
-        clearance: d, signed distance of p_G to the boundary of the governed set [m].
-        stiffness: K [1/s^2].
-    """
-    x, y = object_state[0] - governor_position[0], object_state[1] - governor_position[1]
-    vx = np.rint(object_state[3] / VELOCITY_STEP) * VELOCITY_STEP
-    vy = np.rint(object_state[4] / VELOCITY_STEP) * VELOCITY_STEP
-    return energy_margin(tracking_energy(x, y, vx, vy, stiffness), clearance, stiffness)
-
-
 @compiled
 def steady_clearance(speed: float, stiffness: float, damping: float, governor_gain: float) -> float:
     """Return the clearance in a long aisle with which the governed object has a steady speed [m].

@@ -96,44 +96,7 @@ def uniform_pair(seed: int, number: int) -> tuple[float, float]:
     return _UNIT * words[0], _UNIT * words[1]
 
 
-@compiled(borrows=True)
-def write_normals(seed: int, number: int, normals: FloatArray) -> None:
-    """Write independent numbers with a standard normal distribution, by the formula of Box and Muller [-].
-
-    None is beyond 6.7 standard deviations, because uniform numbers come in steps of 2^-32.
-
-    Args:
-        seed: Which sequence, from 0 to 2^32 - 1.
-        number: Which draw of the sequence, not negative.
-        normals: Receives the numbers, shape (n,).
-    """
-    for i in range(0, normals.size, 4):
-        words = random_words((number & _WORD, number >> 32, 1 + i, 0), (seed, 0))
-        for k in range(2):
-            length = sqrt(-2.0 * log(_UNIT * (words[2 * k] + 0.5)))
-            angle = 2.0 * pi * _UNIT * words[2 * k + 1]
-            first = i + 2 * k
-            if first + 1 < normals.size:  # Both, so that one function of the C library makes both.
-                normals[first], normals[first + 1] = length * cos(angle), length * sin(angle)
-            elif first < normals.size:
-                normals[first] = length * cos(angle)
-
-
 # Errors of what a sensor measures once in every control period: normal noise and square waves.
-
-
-@compiled
-def square_wave(number: int, size: float, length: float, phase: float) -> float:
-    """Return ``size`` in the first half of every wave and ``-size`` in the second.
-
-    Args:
-        number: Number of the control period.
-        size: Magnitude.
-        length: Control periods of a wave, positive.
-        phase: How much of a wave has passed at number 0, in waves [-].
-    """
-    passed = number / length + phase
-    return size if passed - floor(passed) < 0.5 else -size
 
 
 @compiled(borrows=True)
@@ -142,34 +105,34 @@ def write_errors(
 ) -> None:
     """Write the errors of all components of a measurement in one control period.
 
+    Each is its deviation times a number with a standard normal distribution, by the formula of Box and
+    Muller, and its wave: its size in the first half of every wave and minus that in the second. No normal
+    number is beyond 6.7 standard deviations, because uniform numbers come in steps of 2^-32.
+
     Args:
         seed: Seed of the noise, from 0 to 2^32 - 1.
         deviations: Standard deviations of the noise, shape (n,).
-        waves: Size, length in control periods and phase of every component's wave, shape (n, 3).
-        number: Number of the period.
+        waves: Of every component's wave its size, its length in control periods, positive, and how much of a
+            wave has passed at number 0, in waves, shape (n, 3).
+        number: Number of the period, not negative.
         errors: Receives the errors, shape (n,).
     """
-    write_normals(seed, number, errors)
+    for i in range(0, errors.size, 4):
+        words = random_words((number & _WORD, number >> 32, 1 + i, 0), (seed, 0))
+        for k in range(2):
+            length = sqrt(-2.0 * log(_UNIT * (words[2 * k] + 0.5)))
+            angle = 2.0 * pi * _UNIT * words[2 * k + 1]
+            first = i + 2 * k
+            if first + 1 < errors.size:  # Both, so that one function of the C library makes both.
+                errors[first], errors[first + 1] = length * cos(angle), length * sin(angle)
+            elif first < errors.size:
+                errors[first] = length * cos(angle)
     for i in range(errors.size):
         errors[i] *= deviations[i]
-        if waves[i, 0] != 0.0:
-            errors[i] += square_wave(number, waves[i, 0], waves[i, 1], waves[i, 2])
-
-
-@compiled(borrows=True)
-def shift_back(values: FloatArray, before: FloatArray, share: float) -> None:
-    """Replace what is measured by what it was a part of a period earlier, or will be later.
-
-    Between two samples, and as much beyond, motions are taken for uniform, so that nothing is shifted by more
-    than the shift times the largest rate in this period.
-
-    Args:
-        values: What there is to measure at a sample, shape (n,).
-        before: What there was at the one before, shape (n,).
-        share: How much earlier, in periods; may be negative [-].
-    """
-    for i in range(values.size):
-        values[i] -= share * (values[i] - before[i])
+        size = waves[i, 0]
+        if size != 0.0:
+            passed = number / waves[i, 1] + waves[i, 2]
+            errors[i] += size if passed - floor(passed) < 0.5 else -size
 
 
 # What channels hold that lose and delay what they carry: reports of robots, and measurements.
@@ -235,26 +198,21 @@ def carry_measurements(
         late: Whether it is late, by r periods, if it is not lost.
         following: Receives what the line holds then, shape (r, 1 + n).
     """
-    rows = kept.shape[0]
-    for i in range(rows - 1):
-        _copy(kept[i + 1], following[i])
-    for i in range(following.shape[1]):
-        following[rows - 1, i] = NOTHING
+    rows, columns = following.shape
+    for i in range(rows):
+        for j in range(columns):
+            following[i, j] = kept[i + 1, j] if i + 1 < rows else NOTHING
     if late and not lost:
         following[rows - 1, 0] = number
-        _copy(measured, following[rows - 1, 1:])
+        for j in range(1, columns):
+            following[rows - 1, j] = measured[j - 1]
     if following[0, 0] <= kept[0, 0]:
-        _copy(kept[0], following[0])
+        for j in range(columns):
+            following[0, j] = kept[0, j]
     if not (lost or late) and number > following[0, 0]:
         following[0, 0] = number
-        _copy(measured, following[0, 1:])
-
-
-@compiled(borrows=True)
-def _copy(values: FloatArray, place: FloatArray) -> None:
-    """Write values at a place; numba's own way also compiles a message for other shapes, which takes long."""
-    for i in range(place.size):
-        place[i] = values[i]
+        for j in range(1, columns):
+            following[0, j] = measured[j - 1]
 
 
 # A predictor: the present state from delayed measurements and from what was commanded since.

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from math import exp, hypot, sqrt
+from math import exp
 
 import numpy as np
 import scipy
 
 from coop_drake.jit import compiled
-from coop_drake.laws.governor import ATTRACTION_RATE, governed_acceleration, tracking_energy
+from coop_drake.laws.governor import governed_acceleration
 from coop_drake.tree.pose import FloatArray
 
 # The nominal motion of the object's position, which all robots compute alike, and its tracking.
@@ -44,76 +44,25 @@ def nominal_flow(stiffness: float, damping: float, period: float) -> FloatArray:
     return flow
 
 
-@compiled
-def excursion(x: float, y: float, vx: float, vy: float, stiffness: float) -> float:
-    """Return a = root(2 E / K), from which p^ is not farther from p_G until p_G moves [m].
-
-    Args:
-        x: First coordinate of p^ - p_G [m].
-        y: Second coordinate [m].
-        vx: First coordinate of p^' [m/s].
-        vy: Second coordinate [m/s].
-        stiffness: K [1/s^2].
-    """
-    return sqrt(2.0 * tracking_energy(x, y, vx, vy, stiffness) / stiffness)
-
-
-@compiled
-def limited_step(vx: float, vy: float, period: float, speed: float, room: float) -> tuple[float, float]:
-    """Return the step of p_G in a period, T p_G', no longer than T times a speed and half the room [m].
-
-    Args:
-        vx: First coordinate of p_G' of (14) [m/s].
-        vy: Second coordinate [m/s].
-        period: T [s].
-        speed: Largest speed of p_G [m/s].
-        room: d - a [m].
-    """
-    length = period * hypot(vx, vy)
-    allowed = min(period * speed, 0.5 * max(room, 0.0))
-    scale = period if length <= allowed else period * allowed / length
-    return scale * vx, scale * vy
-
-
-@compiled
-def reach_of(distance: float, period: float, periods: float, speed: float) -> float:
-    """Return the longest way that p_G can go in some periods [m].
-
-    The field (13) moves p_G by at most ``ATTRACTION_RATE`` times its distance from the target, which with
-    every step can grow by as much.
-
-    Args:
-        distance: Distance of p_G from the target [m].
-        period: T [s].
-        periods: Number of periods [-].
-        speed: Largest speed of p_G [m/s].
-    """
-    growth: float = (1.0 + ATTRACTION_RATE * period) ** periods - 1.0
-    return min(periods * period * speed, distance * growth)
-
-
 @compiled(borrows=True)
-def tracked_acceleration(
-    position: float,
-    velocity: float,
-    governor_position: float,
-    nominal: tuple[float, float],
-    expected: tuple[float, float],
-    gains: tuple[float, float, float, float],
-) -> float:
-    """Return one coordinate of the object's desired acceleration: that of p^, and the pull towards it.
+def track_nominal(
+    gains: FloatArray, object_state: FloatArray, governor: FloatArray, nominal: FloatArray,
+    expected: FloatArray, acceleration: FloatArray,
+) -> None:  # fmt: skip
+    """Write the object's desired acceleration: that of p^, and the pull towards it, shape (2,) [m/s^2].
 
     Args:
-        position: Coordinate of p as measured [m].
-        velocity: The same coordinate of p' as measured [m/s].
-        governor_position: The same coordinate of p_G [m].
-        nominal: p^ and p^' now [m, m/s].
-        expected: p^ and p^' when p and p' were measured [m, m/s].
-        gains: K [1/s^2], zeta [1/s], K_t [1/s^2], zeta_t [1/s].
+        gains: K, zeta, K_t and zeta_t, shape (4,).
+        object_state: Pose and twist of the object as measured, shape (6,).
+        governor: p_G, shape (2,) [m].
+        nominal: p^ and p^' now, shape (4,) or longer.
+        expected: p^ and p^' when the object was measured, shape (4,) or longer.
+        acceleration: Receives it.
     """
-    own = governed_acceleration(nominal[0], nominal[1], governor_position, gains[0], gains[1])
-    pull = governed_acceleration(position - expected[0], velocity - expected[1], 0.0, gains[2], gains[3])
-    return own + pull
+    for i in range(2):
+        away, fast = object_state[i] - expected[i], object_state[3 + i] - expected[2 + i]
+        own = governed_acceleration(nominal[i], nominal[2 + i], governor[i], gains[0], gains[1])
+        acceleration[i] = own + governed_acceleration(away, fast, 0.0, gains[2], gains[3])
 
 
 # The nominal motion of an axis, which all robots that know the axis compute alike, and its tracking.
@@ -171,23 +120,6 @@ def carry_axes(
 
 
 @compiled(borrows=True)
-def pulled_axis(
-    command: float, position: float, rate: float, expected: tuple[float, float], gains: tuple[float, float]
-) -> float:
-    """Return u, the command of one axis with the pull towards its nominal motion [rad/s^2 or m/s^2].
-
-    Args:
-        command: L(t, x^, x^') now [rad/s^2 or m/s^2].
-        position: x as measured [rad or m].
-        rate: x' as measured [rad/s or m/s].
-        expected: x^ and x^' when these were measured.
-        gains: K_a [1/s^2] and zeta_a [1/s].
-    """
-    away, fast = position - expected[0], rate - expected[1]
-    return command + governed_acceleration(away, fast, 0.0, gains[0], gains[1])
-
-
-@compiled(borrows=True)
 def pull_axes(
     commands: FloatArray,
     object_state: FloatArray,
@@ -210,7 +142,8 @@ def pull_axes(
     for i in range(1 + n):
         x = robot_state[2 + i] if i else object_state[2]
         rate = robot_state[5 + n + i] if i else object_state[5]
-        pulled[i] = pulled_axis(commands[i], x, rate, (expected[0, i], expected[1, i]), gains)
+        away, fast = x - expected[0, i], rate - expected[1, i]
+        pulled[i] = commands[i] + governed_acceleration(away, fast, 0.0, gains[0], gains[1])
 
 
 @compiled(borrows=True)

@@ -23,6 +23,9 @@ that the exponential funnel of the same lambda is closed for all purposes then, 
 STEEPEST = 1.875
 """Largest rate of the quintic over u [-], at u = 1 / 2."""
 
+PEAK_RATE = STEEPEST / CLOSING
+"""Largest rate of a quintic bound over lambda times the distance that it moves [-]."""
+
 
 @dataclass(frozen=True)
 class Funnel:
@@ -212,28 +215,6 @@ def lagging_clock(time: float, held: float, start: FloatArray) -> tuple[float, f
     return a, b, HOLD_RATE * (a - b), start[2] + lost
 
 
-@compiled(borrows=True)
-def slowed_bounds(
-    bounds: tuple[float, float, float, float, float, float], pace: float, pace_rate: float
-) -> tuple[float, float, float, float, float, float]:
-    """Return the bounds of ``axis_bounds`` with their rates and accelerations on a clock that runs slower.
-
-    Args:
-        bounds: Bounds, their rates and accelerations by the clock's own time.
-        pace: tau' [-].
-        pace_rate: tau'' [1/s].
-    """
-    lower, upper, lower_rate, upper_rate, lower_acceleration, upper_acceleration = bounds
-    return (
-        lower,
-        upper,
-        lower_rate * pace,
-        upper_rate * pace,
-        lower_acceleration * pace * pace + lower_rate * pace_rate,
-        upper_acceleration * pace * pace + upper_rate * pace_rate,
-    )
-
-
 # Hand-overs without steps: accelerations and gains go smoothly from the last cell's to the next one's.
 #
 # At a switch the law of the next cell asks for other accelerations than the law of the last one does. An
@@ -337,16 +318,15 @@ def speed_damping(power: float, speed_squared: float, limit: float, gain: float)
     return excess / speed_squared if excess > 0.0 and speed_squared > 0.0 else 0.0
 
 
-@compiled
-def funnel_rate(decay_rate: float, shrink: float, quintic: bool) -> float:
-    """Return the largest rate of a funnel's bound [rad/s or m/s].
+def funnel_rate(decay_rate: FloatArray, shrink: FloatArray, quintic: bool) -> FloatArray:
+    """Return the largest rates of the bounds of some funnels, shape (m,) [rad/s or m/s].
 
     Args:
-        decay_rate: lambda [1/s].
-        shrink: Distance that the bound moves [rad or m].
-        quintic: Whether the funnel is quintic.
+        decay_rate: lambda, shape (m,) [1/s].
+        shrink: Distance that the bound moves, shape (m,) [rad or m].
+        quintic: Whether the funnels are quintic.
     """
-    return decay_rate * shrink * (STEEPEST / CLOSING if quintic else 1.0)
+    return decay_rate * shrink * (PEAK_RATE if quintic else 1.0)
 
 
 @compiled
@@ -361,7 +341,7 @@ def slowed_decay_rate(decay_rate: float, shrink: float, quintic: bool, limit: fl
     """
     if limit == inf or shrink <= 0.0:
         return decay_rate
-    return min(decay_rate, FUNNEL_SHARE * limit / funnel_rate(1.0, shrink, quintic))
+    return min(decay_rate, FUNNEL_SHARE * limit / (shrink * (PEAK_RATE if quintic else 1.0)))
 
 
 # Prescribed performance control of the object's angle and of every joint, (18)-(20) and (35)-(38).

@@ -9,7 +9,7 @@ from coop_drake.jit import compiled
 from coop_drake.laws.axis_table import ENERGY_BOUND, GOAL_LOWER, GOAL_UPPER, REST_RATE, REST_REACH, track_row
 from coop_drake.laws.governor import energy_margin
 from coop_drake.laws.measurements import whole_periods
-from coop_drake.laws.robot_dynamics import PX, PY, rotated, write_motion
+from coop_drake.laws.robot_dynamics import PX, PY, rotated
 from coop_drake.tree.pose import FloatArray
 
 # When a robot reports that it is ready to leave a cell, or that the goal is reached (after (10)-(12)).
@@ -64,34 +64,6 @@ def clearance_margin(margin: float, stiffness: float, inradius: float) -> float:
 
 
 @compiled
-def funnel_margin(energy: float, energy_bound: float) -> float:
-    """Return (bound - V) / max(V, bound), positive where V lets an axis enter its next funnel.
-
-    Args:
-        energy: V of the axis at the beginning of the next funnel, with the next gains [rad^2/s^2 or m^2/s^2].
-        energy_bound: Largest V with which that funnel may be entered, in the same unit.
-    """
-    return (energy_bound - energy) / max(energy, energy_bound)
-
-
-@compiled
-def hand_over_margin(time: float, duration: float) -> float:
-    """Return by how much the last hand-over is over, 1 where it takes no time.
-
-    Args:
-        time: Time since the cell was entered [s].
-        duration: T, in which the commands of the last cell fade [s].
-    """
-    return min(time / duration - 1.0, 1.0) if duration > 0.0 else 1.0
-
-
-@compiled
-def rest_margin(rate: float) -> float:
-    """Return 1 - |x'| / ``RATE_TOLERANCE`` of one axis, positive where it counts as at rest."""
-    return 1.0 - abs(rate) / RATE_TOLERANCE
-
-
-@compiled
 def position_arrival(distance: float, speed: float, tolerance: float) -> float:
     """Return by how much the object's origin is at the goal and at rest.
 
@@ -104,11 +76,11 @@ def position_arrival(distance: float, speed: float, tolerance: float) -> float:
 
 
 @compiled(borrows=True)
-def axis_ready(row: FloatArray, next_row: FloatArray, position: float, rate: float) -> float:
-    """Return the margin with which one axis may enter the next cell: inside its goal, and V small enough.
+def axis_ready(row: FloatArray, next_row: FloatArray, position: float, rate: float) -> tuple[float, float]:
+    """Return the margins with which one axis may enter the next cell: inside its goal, and V small enough.
 
-    An axis that leaves its cell at rest must instead be near the middle of its goal interval, and slow, as a
-    ``RestCondition`` says.
+    V is that at the beginning of the next funnel, with the next gains. An axis that leaves its cell at rest
+    must instead be near the middle of its goal interval, and slow, as a ``RestCondition`` says.
 
     Args:
         row: The axis in the current cell, a row of an ``axis_table``.
@@ -118,17 +90,17 @@ def axis_ready(row: FloatArray, next_row: FloatArray, position: float, rate: flo
     """
     if row[REST_RATE] > 0.0:
         away = abs(position - 0.5 * (row[GOAL_LOWER] + row[GOAL_UPPER]))
-        return float(min(1.0 - away / row[REST_REACH], 1.0 - abs(rate) / row[REST_RATE]))
-    energy = track_row(next_row, 0.0, position, rate)[1]
+        return 1.0 - away / row[REST_REACH], 1.0 - abs(rate) / row[REST_RATE]
+    energy, bound = track_row(next_row, 0.0, position, rate)[1], next_row[ENERGY_BOUND]
     inside = interval_margin(position, row[GOAL_LOWER], row[GOAL_UPPER])
-    return min(inside, funnel_margin(energy, next_row[ENERGY_BOUND]))
+    return inside, (bound - energy) / max(energy, bound)
 
 
 @compiled(borrows=True)
 def axis_arrival(row: FloatArray, position: float, rate: float) -> float:
     """Return the margin with which, in the last cell, one axis is inside its goal and at rest."""
     inside = interval_margin(position, row[GOAL_LOWER], row[GOAL_UPPER])
-    return min(inside, rest_margin(rate))
+    return min(inside, 1.0 - abs(rate) / RATE_TOLERANCE)
 
 
 # When a sampled robot says that the goal is reached: by the pose and the joints that it measures, averaged.
@@ -160,7 +132,8 @@ SCATTER = 2.5
 """Largest s^2 over d^2 in noise [-]: of 20 independent numbers the share has a deviation of 0.2 about 1."""
 
 FAR = -1.0
-"""Margin of a robot that has not measured for long enough [-]."""
+"""Margin of a robot that has not measured for long enough, or at most that of one whose monitor is not quiet
+[-]."""
 
 
 class ArrivalGoal(NamedTuple):
@@ -198,43 +171,38 @@ def arrival_margin(
             fewer, shape (2 W, 3 + n) [m, rad].
         newest: The row of the newest ones; the older ones stand before it, the last row before the first.
     """
-    margin = 1.0
-    x, y = _statistics(recent, newest, 0), _statistics(recent, newest, 1)
-    for i in range(tolerances.size):
-        if i == 0:
-            away, before = hypot(x[0] - place[0], y[0] - place[1]), x[1]
-            moved = hypot(x[0] - x[1], y[0] - y[1])
-            scatter, steps = 0.5 * (x[2] + y[2]), 0.5 * (x[3] + y[3])
-            rest, deviations = MEAN_TIME * SPEED_TOLERANCE, PLANE_DEVIATIONS
-        else:
-            mean, before, scatter, steps = _statistics(recent, newest, 2 + i - 1)
-            away, moved = abs(mean - place[1 + i]), abs(mean - before)
-            rest, deviations = MEAN_TIME * RATE_TOLERANCE, DEVIATIONS
+    margin, rows, x = 1.0, recent.shape[0], (0.0, 0.0, 0.0, 0.0)
+    half = rows // 2
+    for column in range(recent.shape[1]):
+        mean = before = scatter = steps = 0.0  # m_1, m_0, s^2 and d^2
+        for i in range(half):
+            mean += recent[(newest - i) % rows, column] / half
+            before += recent[(newest - half - i) % rows, column] / half
+        for i in range(half):
+            value = recent[(newest - i) % rows, column]
+            scatter += (value - mean) ** 2 / (half - 1)
+            if i + 1 < half:
+                steps += 0.5 * (value - recent[(newest - i - 1) % rows, column]) ** 2 / (half - 1)
         if not isfinite(before):
             return FAR
-        noise, still = deviations * sqrt(2.0 * scatter / recent.shape[0]), rest + errors[i]
-        margin = min(margin, 1.0 - moved / (rest + 2.0 * (errors[i] + noise)))
+        if column == 0:  # It is judged with the next one.
+            x = mean, before, scatter, steps
+            continue
+        if column == 1:
+            away, moved = hypot(x[0] - place[0], mean - place[1]), hypot(x[0] - x[1], mean - before)
+            scatter, steps = 0.5 * (x[2] + scatter), 0.5 * (x[3] + steps)
+            rest, deviations = MEAN_TIME * SPEED_TOLERANCE, PLANE_DEVIATIONS
+        else:
+            away, moved = abs(mean - place[column]), abs(mean - before)
+            rest, deviations = MEAN_TIME * RATE_TOLERANCE, DEVIATIONS
+        tolerance, error = tolerances[column - 1], errors[column - 1]
+        noise, still = deviations * sqrt(2.0 * scatter / rows), rest + error
+        margin = min(margin, 1.0 - moved / (rest + 2.0 * (error + noise)))
         margin = min(margin, 1.0 - scatter / (SCATTER * steps + still * still))
-        if tolerances[i] < inf:
-            within = tolerances[i] - max(EROSION * tolerances[i], errors[i], noise)
+        if tolerance < inf:
+            within = tolerance - max(EROSION * tolerance, error, noise)
             margin = min(margin, 1.0 - away / within if within > 0.0 else FAR)
     return margin
-
-
-@compiled(borrows=True)
-def _statistics(recent: FloatArray, newest: int, column: int) -> tuple[float, float, float, float]:
-    """Return m_1, m_0, s^2 and d^2 of one column."""
-    rows = recent.shape[0]
-    half, mean, before, scatter, steps = rows // 2, 0.0, 0.0, 0.0, 0.0
-    for i in range(half):
-        mean += recent[(newest - i) % rows, column] / half
-        before += recent[(newest - half - i) % rows, column] / half
-    for i in range(half):
-        value = recent[(newest - i) % rows, column]
-        scatter += (value - mean) ** 2 / (half - 1)
-        if i + 1 < half:
-            steps += 0.5 * (value - recent[(newest - i - 1) % rows, column]) ** 2 / (half - 1)
-    return mean, before, scatter, steps
 
 
 # How far a robot and its object are measured off their nominal motion, and what counts as an alarm.
@@ -312,24 +280,10 @@ def departing_name(check: int, joints: tuple[str, ...]) -> str:
 
 
 @compiled(borrows=True)
-def alarm_stage(times: FloatArray, time: float) -> int:
-    """Return the number of the stage of a cell whose levels hold at a time since its entry.
-
-    Args:
-        times: When the stages begin, the first one at 0, infinite behind the last one, shape (stages,) [s].
-        time: Time since the entry [s].
-    """
-    stage = 0
-    while stage + 1 < times.size and times[stage + 1] <= time:
-        stage += 1
-    return stage
-
-
-@compiled(borrows=True)
 def largest_departure(
-    chain: FloatArray, p_LE: FloatArray, mounting: FloatArray, motion: FloatArray, robot: FloatArray,
-    seen: FloatArray, led: FloatArray, axes: FloatArray, levels: FloatArray, axis_levels: FloatArray,
-    unseen: float,
+    p_LE: FloatArray, mounting: FloatArray, hand: FloatArray, robot: FloatArray, seen: FloatArray,
+    led: FloatArray, axes: FloatArray, levels: FloatArray, stages: FloatArray, stage_levels: FloatArray,
+    time: float, unseen: float,
 ) -> tuple[float, int]:  # fmt: skip
     """Return the largest measured departure over its level [-], and the number of this level.
 
@@ -337,22 +291,24 @@ def largest_departure(
     where both take them.
 
     Args:
-        chain: From the robot's base to its end effector.
         p_LE: The grasp in L, shape (2,) or longer [m].
         mounting: See ``place_on_axes``, shape (1 + n,).
-        motion: Room for the chain's motion, see ``motion_room``.
+        hand: Last row of the chain's motion, which ``estimate_object`` has written.
         robot: (z_k, z_k') as measured, shape (2 (3 + n),).
         seen: What ``estimate_object`` makes of it and of the measured pose, shape (6,).
         led: p^ and p^' when this was measured, shape (4,) or longer.
         axes: x^ and x^' then, shape (2, 1 + n) or more rows; shape (2, 0) where they have no nominal motion.
         levels: Of position, velocity, grasp, angle of the base, infinite where there is none, and of where
             the position goes, shape (5,).
-        axis_levels: Of the axes then, of their rates, and of where both take them, shape (3, 1 + n).
+        stages: Times since the entry of the cell at which the stages of its levels begin, the first one at 0,
+            infinite behind the last one, shape (stages,) [s].
+        stage_levels: Of the axes, of their rates, and of where both take them, shape (stages, 3, 1 + n).
+        time: Time since the entry when this was measured [s].
         unseen: t, how far ahead that is [s].
     """
-    largest, which, n = 0.0, POSITION, mounting.size - 1
-    last = chain.shape[0] - 1
-    write_motion(chain, robot, motion)
+    largest, which, n, stage = 0.0, POSITION, mounting.size - 1, 0
+    while stage + 1 < stages.size and stages[stage + 1] <= time:
+        stage += 1
     rx, ry = rotated(cos(seen[2]), sin(seen[2]), p_LE[0], p_LE[1])
     turn = robot[2] - seen[2] - mounting[0]
     for i in range(n):
@@ -366,8 +322,7 @@ def largest_departure(
         elif number == AHEAD:
             away = hypot(e_x + unseen * v_x, e_y + unseen * v_y)
         elif number == GRASP:
-            slipped_x = robot[0] + motion[last, PX] - seen[0] - rx
-            away = hypot(slipped_x, robot[1] + motion[last, PY] - seen[1] - ry)
+            away = hypot(robot[0] + hand[PX] - seen[0] - rx, robot[1] + hand[PY] - seen[1] - ry)
         else:
             away = abs(atan2(sin(turn), cos(turn)))
         if away > largest * levels[number]:
@@ -376,15 +331,9 @@ def largest_departure(
         e = (robot[2 + i] if i > 0 else seen[2]) - axes[0, i]
         v = (robot[5 + n + i] if i > 0 else seen[5]) - axes[1, i]
         for row, off in enumerate((e, v, e + unseen * v)):
-            if abs(off) > largest * axis_levels[row, i]:
-                largest, which = abs(off) / axis_levels[row, i], 5 + row * axes.shape[1] + i
+            if abs(off) > largest * stage_levels[stage, row, i]:
+                largest, which = abs(off) / stage_levels[stage, row, i], 5 + row * axes.shape[1] + i
     return largest, which
-
-
-@compiled
-def quiet_margin(margin: float, alarm: float) -> float:
-    """Return the margin with which a robot is ready: less than zero where its monitor is not quiet [-]."""
-    return min(margin, -1.0) if alarm > QUIET else margin
 
 
 @compiled

@@ -22,20 +22,6 @@ def rotated(c: float, s: float, x: float, y: float) -> tuple[float, float]:
 
 
 @compiled
-def object_twist(rx: float, ry: float, vx: float, vy: float, w: float) -> tuple[float, float, float]:
-    """Return the object's twist A^-1 J z' of (29), as a robot knows it from its own motion.
-
-    Args:
-        rx: First coordinate of the grasp from the object's origin [m].
-        ry: Second coordinate [m].
-        vx: First coordinate of the end effector's velocity [m/s].
-        vy: Second coordinate [m/s].
-        w: Its angular rate [rad/s].
-    """
-    return vx + ry * w, vy - rx * w, w
-
-
-@compiled
 def acceleration_at(
     rx: float, ry: float, ax: float, ay: float, alpha: float, w: float
 ) -> tuple[float, float]:
@@ -223,7 +209,7 @@ def estimate_object(
     vx, vy, w = robot[first] + motion[last, VX], robot[first + 1] + motion[last, VY], motion[last, W]
     rx, ry = rotated(np.cos(pose[2]), np.sin(pose[2]), p_LE[0], p_LE[1])
     object_state[0], object_state[1], object_state[2] = pose[0], pose[1], pose[2]
-    object_state[3], object_state[4], object_state[5] = object_twist(rx, ry, vx, vy, w)
+    object_state[3], object_state[4], object_state[5] = vx + ry * w, vy - rx * w, w
 
 
 @compiled(borrows=True)

@@ -10,7 +10,7 @@ import numpy as np
 from shapely import MultiPolygon, Polygon
 
 from coop_drake.geometry.distances import separated
-from coop_drake.geometry.sweeps import over_joint, rounded_sweep
+from coop_drake.geometry.sweeps import disc_turn, grown, over_joint
 from coop_drake.geometry.swept_tree import TOUCH, BodyPairs, SweptTree
 from coop_drake.jit import compiled
 from coop_drake.planning.cells.cells import FreeBox
@@ -122,7 +122,7 @@ def swept_piece(
             sweeps.widths[row] = widest
             row += 1
         if link < 0:
-            return rounded_sweep(team, piece, ring, widest), vertices, row
+            return grown(ring, team.radii[piece], disc_turn(0.5 * widest)), vertices, row
         axis = team.links[link, 1] - 2
         widest = max(widest, upper[axis] - lower[axis])
         ring = over_joint(team, link, ring, lower, upper)
@@ -143,7 +143,8 @@ def sweeps_apart(boxes: BoxArrays, sweeps: PairSweeps, swept: FloatArray) -> boo
     discs = np.empty((count, 3))
     for k in range(count):
         ring = swept[sweeps.first[k] : sweeps.first[k + 1]]
-        ring = rounded_sweep(boxes.team, boxes.pair_sweeps[k, 0], ring, sweeps.widths[k])
+        radius = boxes.team.radii[boxes.pair_sweeps[k, 0]]
+        ring = grown(ring, radius, disc_turn(0.5 * sweeps.widths[k]))
         enclosing_disc(ring, discs[k])
         vertices = with_ring(vertices, first[k], ring)
         first[k + 1] = first[k] + len(ring)

@@ -16,13 +16,12 @@ from coop_drake.laws.axis_table import (
     FADING_TIME,
     LEAVING_TIME,
     LOG_GAIN,
-    REST_RATE,
     SATURATION,
     axis_table,
     bounds_of,
     first_jumps,
     limited_row,
-    rest_jump,
+    switch_jump,
     track_row,
 )
 from coop_drake.laws.governor import (
@@ -41,7 +40,6 @@ from coop_drake.laws.readiness import (
     axis_arrival,
     axis_ready,
     clearance_margin,
-    hand_over_margin,
     position_arrival,
 )
 from coop_drake.tree.pose import FloatArray
@@ -97,14 +95,6 @@ vanishes."""
 
 
 @compiled(borrows=True)
-def _margin(state: FloatArray, edges: FloatArray, stiffness: float) -> tuple[float, float]:
-    """Return Delta E of (15) in a cell, and the clearance of p_G [m]."""
-    clearance = signed_distance(edges, state[4], state[5])
-    energy = tracking_energy(state[0] - state[4], state[1] - state[5], state[2], state[3], stiffness)
-    return energy_margin(energy, clearance, stiffness), clearance
-
-
-@compiled(borrows=True)
 def _rates(
     state: FloatArray,
     time: float,
@@ -117,7 +107,9 @@ def _rates(
 ) -> None:
     """Write the rates of (p, p', p_G, axes, axis rates); arguments as in ``cross_cell``."""
     stiffness, damping, gain = governed_gains(row, time)
-    margin, clearance = _margin(state, edges, stiffness)
+    clearance = signed_distance(edges, state[4], state[5])
+    energy = tracking_energy(state[0] - state[4], state[1] - state[5], state[2], state[3], stiffness)
+    margin = energy_margin(energy, clearance, stiffness)
     for i in range(2):
         result[i] = state[2 + i]
         result[2 + i] = governed_acceleration(state[i], state[2 + i], state[4 + i], stiffness, damping)
@@ -186,12 +178,14 @@ def _may_leave(
                 return False
         distance = hypot(state[0] - target[0], state[1] - target[1])
         return bool(position_arrival(distance, hypot(state[2], state[3]), inradius) >= 0.0)
-    if hand_over_margin(time, table[0, LEAVING_TIME]) < 0.0:
+    if time < table[0, LEAVING_TIME]:
         return False
     for i in range(m):
-        if axis_ready(table[i], next_table[i], state[6 + i], state[6 + m + i]) < 0.0:
+        if min(axis_ready(table[i], next_table[i], state[6 + i], state[6 + m + i])) < 0.0:
             return False
-    margin, _ = _margin(state, next_edges, next_stiffness)
+    clearance = signed_distance(next_edges, state[4], state[5])
+    energy = tracking_energy(state[0] - state[4], state[1] - state[5], state[2], state[3], next_stiffness)
+    margin = energy_margin(energy, clearance, next_stiffness)
     return bool(clearance_margin(margin, next_stiffness, inradius) >= 0.0)
 
 
@@ -239,13 +233,7 @@ def cross_cell(
     while time <= time_limit:
         if _may_leave(state, time, table, path[-1], inradius, next_edges, next_stiffness, next_table, last):
             for i in range(0 if last else m):
-                x, rate = state[6 + i], state[6 + m + i]
-                if table[i, REST_RATE] > 0.0:
-                    jumps[i] = rest_jump(table[i], next_table[i])
-                else:
-                    jumps[i] = (
-                        track_row(table[i], time, x, rate)[0] - track_row(next_table[i], 0.0, x, rate)[0]
-                    )
+                jumps[i] = switch_jump(table[i], next_table[i], time, state[6 + i], state[6 + m + i])
             return time
         # The steps until the next check are short enough for the fastest motion now: the spring's, p_G's, or
         # the one with which the log term of (18) pulls at an axis where it is now.

@@ -130,8 +130,8 @@ def _needs(plan: Plan) -> FloatArray:
     for index, transition in enumerate(plan.transitions):
         funnel, quintic = plan.funnel(index), transition.gains.funnel == "quintic"
         shrink = np.maximum(funnel.goal_lower - funnel.slice_lower, funnel.slice_upper - funnel.goal_upper)
-        rates = [funnel_rate(*axis, quintic) for axis in zip(funnel.decay_rate, shrink, strict=True)]
-        fastest[1:] = np.maximum(fastest[1:], np.array(rates) / FUNNEL_SHARE)
+        rates = funnel_rate(funnel.decay_rate, shrink, quintic)
+        fastest[1:] = np.maximum(fastest[1:], rates / FUNNEL_SHARE)
     return np.maximum(fastest, RATE_TOLERANCE)
 
 

@@ -449,18 +449,10 @@ def _carry(
                 if k >= leaving:
                     state[2, p, i] = max(state[2, p, i], now[2, p, i])
         _enter(now, moving[:, k], (coupling, errors), scales, found[:, k], entered[:, :, :, memory + k])
-        if k > 0:
-            _join(found, now[0], k - 1)
+        for p in range(parts if k > 0 else 0):  # A period ends where the next one begins.
+            found[0, k - 1] = np.maximum(found[0, k - 1], now[0, p])
     _settle(responses, coupling, scales, moving[:, ever], entered, state, found)
-    _join(found, found[:1, ever], ever - 1)
-
-
-@compiled(borrows=True)
-def _join(found: FloatArray, following: FloatArray, k: int) -> None:
-    """Add to the departures of a period those at its end, shape (parts, axes)."""
-    for i in range(following.shape[1]):
-        for p in range(following.shape[0]):
-            found[0, k, i] = max(found[0, k, i], following[p, i])
+    found[0, ever - 1] = np.maximum(found[0, ever - 1], found[0, ever])
 
 
 @compiled

@@ -6,6 +6,8 @@ rest, its line about rest once funnels are closed, when they are, and how slowly
 
 from __future__ import annotations
 
+from math import log
+
 import numpy as np
 
 from coop_drake.answers.budget import QUINTIC_FUNNELS
@@ -21,7 +23,6 @@ from coop_drake.laws.axis_table import (
     SATURATION,
     bounds_of,
     gains_of,
-    saturated,
     slope_bounds,
     slopes_between,
     track_row,
@@ -47,14 +48,12 @@ SHORTEST = 1e-9
 """Shortest interval for which a line is fitted [rad or m]."""
 
 PLACE, Q, S, VALUE, X_LOWER, X_UPPER, V_LOWER, V_UPPER = range(8)
-"""Rows of the memory for intermediate results: ``place_in`` and the law at the ends of all pieces, and the
-bounds of the slopes in each piece. Loops over rows use vector units, which halves the time."""
+"""Rows of the memory for intermediate results: dl / w, the same where distances saturate, ln(dl / du) and the
+law at the ends of all pieces, and the bounds of the slopes in each piece. Loops over rows use vector units,
+which halves the time."""
 
-
-@compiled
-def law_memory() -> FloatArray:
-    """Return memory for ``fit_law``, which need not be allocated for every sample again."""
-    return np.empty((8, PIECES + 1))
+MEMORY = (8, PIECES + 1)
+"""Shape of the memory, which need not be allocated for every sample again."""
 
 
 @compiled(borrows=True)
@@ -73,15 +72,28 @@ def fit_law(
         position: x [rad or m].
         reach: Largest |a| [rad or m].
         rate: v [rad/s or m/s].
-        memory: For intermediate results, see ``law_memory``.
+        memory: For intermediate results, shape ``MEMORY``.
 
     Returns:
         l [1/s^2], m [1/s], R [rad/s^2 or m/s^2] and r [1/s].
     """
     reach = max(reach, SHORTEST)
     bounds, gains = bounds_of(row, time), gains_of(row, time)
-    _tabulate(bounds, gains, (position, reach, rate), memory)
-    middle, length = track_axis(position, rate, bounds, gains)[0], 2.0 * reach / PIECES
+    width, saturation, length = bounds[1] - bounds[0], gains[4], 2.0 * reach / PIECES
+    for i in range(PIECES + 1):
+        memory[PLACE, i] = (position - reach + i * length - bounds[0]) / width
+        memory[Q, i] = min(max(memory[PLACE, i], saturation), 1.0 - saturation)
+    for i in range(PIECES + 1):
+        memory[S, i] = np.log(memory[Q, i] / (1.0 - memory[Q, i]))
+    for i in range(PIECES + 1):
+        q = memory[Q, i]
+        memory[VALUE, i] = track_distances(q * width, (1.0 - q) * width, memory[S, i], rate, bounds, gains)[0]
+    for i in range(PIECES):
+        first = memory[PLACE, i], memory[Q, i], memory[S, i]
+        last = memory[PLACE, i + 1], memory[Q, i + 1], memory[S, i + 1]
+        found = slopes_between(bounds, gains, first, last, rate)
+        memory[X_LOWER, i], memory[X_UPPER, i], memory[V_LOWER, i], memory[V_UPPER, i] = found
+    middle = track_axis(position, rate, bounds, gains)[0]
     quarter, values = PIECES // 4, memory[VALUE]
     whole, half = values[PIECES] - values[0], values[3 * quarter] - values[quarter]
     slope = (whole + half) / (3.0 * reach)
@@ -92,32 +104,6 @@ def fit_law(
         rest = max(rest, ends + 0.25 * length * (memory[X_UPPER, i] - memory[X_LOWER, i]))
         v_least, v_most = min(v_least, memory[V_LOWER, i]), max(v_most, memory[V_UPPER, i])
     return slope, 0.5 * (v_least + v_most), rest, 0.5 * (v_most - v_least)
-
-
-@compiled(borrows=True)
-def _tabulate(
-    bounds: tuple[float, float, float, float, float, float],
-    gains: tuple[float, float, float, float, float],
-    about: tuple[float, float, float],
-    memory: FloatArray,
-) -> None:
-    """Write the law at the ends of all pieces about (x, reach, v), and bounds of its slopes between them."""
-    position, reach, rate = about
-    pieces, width, saturation = memory.shape[1] - 1, bounds[1] - bounds[0], gains[4]
-    length = 2.0 * reach / pieces
-    for i in range(pieces + 1):
-        memory[PLACE, i] = (position - reach + i * length - bounds[0]) / width
-        memory[Q, i] = saturated(memory[PLACE, i], saturation)
-    for i in range(pieces + 1):
-        memory[S, i] = np.log(memory[Q, i] / (1.0 - memory[Q, i]))
-    for i in range(pieces + 1):
-        q = memory[Q, i]
-        memory[VALUE, i] = track_distances(q * width, (1.0 - q) * width, memory[S, i], rate, bounds, gains)[0]
-    for i in range(pieces):
-        first = memory[PLACE, i], memory[Q, i], memory[S, i]
-        last = memory[PLACE, i + 1], memory[Q, i + 1], memory[S, i + 1]
-        found = slopes_between(bounds, gains, first, last, rate)
-        memory[X_LOWER, i], memory[X_UPPER, i], memory[V_LOWER, i], memory[V_UPPER, i] = found
 
 
 @compiled(borrows=True)
@@ -140,20 +126,18 @@ def command_near(
     return u, slope, by_rate, rest, abs(u) + abs(slope) * reach + abs(by_rate) * fast + rest
 
 
-@compiled
 def line_at_rest(row: FloatArray, time: float, x: float, v: float) -> tuple[float, float, float, float]:
     """Return the law's slopes, the size of its rest and the largest |x''|, for departures up to x and v."""
     k1, k1_dot = ramped_gain(time, row[POSITION_GAIN], row[RAMP_RATE])
     lower, upper = bounds_of(row, time)[:2]
     missing = row[POSITION_GAIN] - k1
-    slope, by_rate, rest, spread = fit_law(row, time, 0.5 * (lower + upper), x, 0.0, law_memory())
+    slope, by_rate, rest, spread = fit_law(row, time, 0.5 * (lower + upper), x, 0.0, np.empty(MEMORY))
     growing = (row[RATE_GAIN] * missing + k1_dot) * x
-    growing += missing * (1.0 - np.log(row[SATURATION])) * v  # |h| <= 1 + |s| <= 1 - ln(saturation)
+    growing += missing * (1.0 - log(row[SATURATION])) * v  # |h| <= 1 + |s| <= 1 - ln(saturation)
     rest += spread * v + growing
     return slope, by_rate, rest, abs(slope) * x + abs(by_rate) * v + rest
 
 
-@compiled(borrows=True)
 def slowest_rate(row: FloatArray) -> float:
     """Return the inverse of the law's slowest time constant about the middle of its closed funnel [1/s]."""
     middle = 0.5 * (row[GOAL_LOWER] + row[GOAL_UPPER])

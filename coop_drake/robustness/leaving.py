@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from math import ceil
 
 import numpy as np
+from numpy.typing import NDArray
 
-from coop_drake.jit import compiled
 from coop_drake.laws.axis_table import GOAL_LOWER, GOAL_UPPER, LEAVING_TIME, REST_RATE, REST_REACH
 from coop_drake.robustness.nominal_axes import (
     ACCELERATION,
@@ -78,23 +78,19 @@ def first_leaving(table: FloatArray, every: Sequence[AxisSets], period: float) -
     return max(stay, first - EARLIER)
 
 
-@compiled(borrows=True)
-def _rests(sample: FloatArray, middle: float, rest: tuple[float, float]) -> bool:
-    """Return whether a motion can be at rest at a sample of a tube."""
-    near = abs(sample[X] - middle) <= rest[0] + sample[X_REACH]
-    return bool(near and abs(sample[V]) <= rest[1] + sample[V_REACH])
+def _rests(tube: FloatArray, middle: float, rest: tuple[float, float]) -> NDArray[np.bool_]:
+    """Return whether a motion can be at rest at every sample of a tube, shape (samples,)."""
+    near = np.abs(tube[:, X] - middle) <= rest[0] + tube[:, X_REACH]
+    slow: NDArray[np.bool_] = np.abs(tube[:, V]) <= rest[1] + tube[:, V_REACH]
+    return near & slow
 
 
-@compiled(borrows=True)
 def _first_rest(tube: FloatArray, middle: float, rest: tuple[float, float], first: int) -> int:
     """Return the first sample of a tube from another one on at which a motion can be at rest, or its end."""
-    for k in range(first, len(tube)):
-        if _rests(tube[k], middle, rest):
-            return k
-    return max(first, len(tube))
+    found = np.flatnonzero(_rests(tube[first:], middle, rest))
+    return first + int(found[0]) if found.size else max(first, len(tube))
 
 
-@compiled(borrows=True)
 def _limit(bounds: FloatArray, middle: float, rest: tuple[float, float], time: float) -> None:
     """Cut bounds of states to where a motion can be that was at rest some time ago."""
     farther = rest[0] + time * (rest[1] + 0.5 * time * bounds[5])
@@ -103,7 +99,6 @@ def _limit(bounds: FloatArray, middle: float, rest: tuple[float, float], time: f
     bounds[2], bounds[3] = max(bounds[2], -faster), min(bounds[3], faster)
 
 
-@compiled
 def _switching(
     tube: FloatArray, middle: float, rest: tuple[float, float], samples: tuple[int, int]
 ) -> FloatArray:
@@ -121,17 +116,18 @@ def _switching(
         Shape (6,): lowest and highest x, lowest and highest v, the two accelerations.
     """
     since, leaving = samples
-    found = np.array([np.inf, -np.inf, np.inf, -np.inf, 0.0, 0.0])
-    reported = -since - 1
-    for k in range(leaving, len(tube)):
-        x, x_reach, v, v_reach = tube[k, X] - middle, tube[k, X_REACH], tube[k, V], tube[k, V_REACH]
-        if _rests(tube[k], middle, rest):
-            reported = k
-        if k - reported > since:
-            continue
-        found[0], found[1] = min(found[0], middle + x - x_reach), max(found[1], middle + x + x_reach)
-        found[2], found[3] = min(found[2], v - v_reach), max(found[3], v + v_reach)
-        found[4] = max(found[4], tube[k, ACCELERATION])
-        for i in range(max(k - since, leaving), k + 1):
-            found[5] = max(found[5], tube[i, ACCELERATION])
-    return found
+    part, numbers = tube[leaving:], np.arange(leaving, len(tube))
+    reported = np.maximum.accumulate(np.where(_rests(part, middle, rest), numbers, -since - 1))
+    leaves = numbers - reported <= since
+    if not leaves.any():
+        return np.array([np.inf, -np.inf, np.inf, -np.inf, 0.0, 0.0])
+    # Samples from which on it is left within the time for which a report may be used.
+    left = np.concatenate([[0], np.cumsum(leaves), np.full(since, np.count_nonzero(leaves))])
+    soon = left[since + 1 :] > left[: len(part)]
+    here, pushed = part[leaves], part[:, ACCELERATION]
+    x, v = here[:, X] - middle, here[:, V]
+    return np.array([
+        (middle + x - here[:, X_REACH]).min(), (middle + x + here[:, X_REACH]).max(),
+        (v - here[:, V_REACH]).min(), (v + here[:, V_REACH]).max(),
+        pushed[leaves].max(), pushed[soon].max(),
+    ])  # fmt: skip

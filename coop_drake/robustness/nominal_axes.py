@@ -27,10 +27,10 @@ from coop_drake.laws.axis_table import (
 )
 from coop_drake.laws.nominal import lag_factors
 from coop_drake.robustness.funnel_law import (
+    MEMORY,
     closed_after,
     command_near,
     jump_at,
-    law_memory,
     line_at_rest,
     slowest_rate,
 )
@@ -86,7 +86,7 @@ def follow_tube(
     for i in range(3):  # to the departures of x, v and x'' at the entry, then to the disturbances of commands
         responses[i, i], weight[i] = 1.0, entry[2 + i]
     x, v, p, x_reach, v_reach, p_reach = entry[0], entry[1], 0.0, entry[2], entry[3], entry[4]
-    lagging, memory = lag_factors(T, conditions.lag), law_memory()
+    lagging, memory = lag_factors(T, conditions.lag), np.empty(MEMORY)
     for k in range(n):
         state = x, x_reach, v, v_reach
         u, slope, by_rate, weight[3 + k], most = command_near(row, k * T, state, jump, memory)
@@ -94,7 +94,14 @@ def follow_tube(
             most = max(most, entry[4])
             u, slope, by_rate, weight[3 + k] = 0.0, 0.0, 0.0, most
         tube[k, COMMAND], tube[k, COMMAND_REACH] = u, most - abs(u)
-        _note(tube[k], row, k * T, T, state, max(abs(p) + p_reach, most))
+        # Between two samples a motion departs from its chord by at most T^2 / 8 times its acceleration, and
+        # so does a bound of the funnel.
+        lower, upper, _, _, bend, other = bounds_of(row, k * T)
+        _, _, _, _, next_bend, next_other = bounds_of(row, k * T + T)
+        bent = max(max(abs(bend), abs(other)), max(abs(next_bend), abs(next_other)))
+        tube[k, X], tube[k, X_REACH], tube[k, V], tube[k, V_REACH] = state
+        fastest, nearest = max(abs(p) + p_reach, most), min(x - x_reach - lower, upper - x - x_reach)
+        tube[k, ACCELERATION], tube[k, DISTANCE] = fastest, nearest - 0.125 * T * T * (fastest + bent)
         if not tube[k, DISTANCE] > 0.0 or not x_reach < DIVERGED:
             return False
         gap = p - u
@@ -102,29 +109,6 @@ def follow_tube(
         p = u + lagging[0] * gap
         x_reach, v_reach, p_reach = _respond(responses, weight, k, (T, slope, by_rate), lagging)
     return True
-
-
-@compiled(borrows=True)
-def _note(
-    sample: FloatArray,
-    row: FloatArray,
-    time: float,
-    period: float,
-    state: tuple[float, float, float, float],
-    fastest: float,
-) -> None:
-    """Write one row of a tube but its command.
-
-    Between two samples a motion departs from its chord by at most T^2 / 8 times its acceleration, and so does
-    a bound of the funnel.
-    """
-    lower, upper, _, _, bend, other = bounds_of(row, time)
-    _, _, _, _, next_bend, next_other = bounds_of(row, time + period)
-    bent = max(max(abs(bend), abs(other)), max(abs(next_bend), abs(next_other)))
-    sample[X], sample[X_REACH], sample[V], sample[V_REACH] = state
-    sample[ACCELERATION] = fastest
-    nearest = min(state[0] - state[1] - lower, upper - state[0] - state[1])
-    sample[DISTANCE] = nearest - 0.125 * period * period * (fastest + bent)
 
 
 @compiled(reassociate=True, borrows=True)
@@ -201,7 +185,6 @@ class Settled(NamedTuple):
     next_rate: float
 
 
-@compiled
 def settle(
     row: FloatArray,
     conditions: AxisConditions,
@@ -226,7 +209,6 @@ def settle(
     return Settled(-1.0, np.inf, np.inf, np.inf, np.inf, np.inf)
 
 
-@compiled
 def staying(
     row: FloatArray,
     conditions: AxisConditions,
@@ -256,14 +238,13 @@ def staying(
     slope, by_rate, size, most = line_at_rest(row, time, x, v)
     fastest = max(most, entry[2])
     sums = _response_sums(conditions, slope, by_rate, entry, samples)
-    x_next, v_next = sums[0, 0] + sums[1, 0] * size, sums[0, 1] + sums[1, 1] * size
+    x_next, v_next = (sums[0] + sums[1] * size).tolist()
     return Settled(half - x - 0.125 * T * T * fastest, fastest, x, v, x_next, v_next)
 
 
-@compiled(borrows=True)
 def tail_samples(row: FloatArray, conditions: AxisConditions) -> int:
     """Return for how many samples an axis is followed after its funnel is closed, ``TIME_CONSTANTS`` long."""
-    return int(np.ceil(TIME_CONSTANTS / (slowest_rate(row) * conditions.period))) + 2
+    return ceil(TIME_CONSTANTS / (slowest_rate(row) * conditions.period)) + 2
 
 
 @compiled
@@ -458,15 +439,10 @@ def axis_sets(
     )
 
 
-@compiled(borrows=True)
 def _closed_part(tube: FloatArray, middle: float) -> tuple[float, float, float, float, float]:
     """Return |x - middle|, |v| and |x''| of the first sample, and the largest of the first two of all."""
-    x = v = 0.0
-    for k in range(len(tube)):
-        x = max(x, abs(tube[k, X] - middle) + tube[k, X_REACH])
-        v = max(v, abs(tube[k, V]) + tube[k, V_REACH])
-    first = tube[0]
-    return abs(first[X] - middle) + first[X_REACH], abs(first[V]) + first[V_REACH], first[ACCELERATION], x, v
+    away, fast = np.abs(tube[:, X] - middle) + tube[:, X_REACH], np.abs(tube[:, V]) + tube[:, V_REACH]
+    return away[0], fast[0], tube[0, ACCELERATION], away.max(), fast.max()
 
 
 def _tubes(

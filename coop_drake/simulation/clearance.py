@@ -13,7 +13,7 @@ import numpy as np
 from shapely import Polygon
 
 from coop_drake.errors import GeometryError
-from coop_drake.geometry.distances import meets_ring, ring_holds, squared_distance, squared_ring_distance
+from coop_drake.geometry.distances import meets_ring, squared_distance, squared_ring_distance
 from coop_drake.geometry.polygons import edges_of, signed_distance
 from coop_drake.jit import compiled
 from coop_drake.tree.component_tree import ComponentTree
@@ -93,7 +93,7 @@ def piece_to_walls(
     depth = 0.0
     for w in range(len(walls)):
         x, y = walls[w, 0], walls[w, 1]
-        if ring_holds(vertices, first, last, x, y):
+        if meets_ring(vertices, first, last, x, y, x, y):
             depth = max(depth, sqrt(squared_ring_distance(vertices, first, last, x, y, x, y, inf)))
     for k in range(first, last):
         depth = max(depth, -signed_distance(walls, vertices[k, 0], vertices[k, 1]))
@@ -116,11 +116,11 @@ def pair_apart(team: TeamArrays, vertices: FloatArray, discs: FloatArray, k: int
         before = corner
         overlap = overlap or meets_ring(vertices, one[1], one[2], u, v, x, y)
         squared = squared_ring_distance(vertices, one[1], one[2], u, v, x, y, squared)
-        if ring_holds(vertices, one[1], one[2], x, y):
+        if meets_ring(vertices, one[1], one[2], x, y, x, y):
             depth = max(depth, sqrt(squared_ring_distance(vertices, one[1], one[2], x, y, x, y, inf)))
     for corner in range(one[1], one[2]):
         x, y = vertices[corner, 0], vertices[corner, 1]
-        if ring_holds(vertices, other[1], other[2], x, y):
+        if meets_ring(vertices, other[1], other[2], x, y, x, y):
             overlap = True
             depth = max(depth, sqrt(squared_ring_distance(vertices, other[1], other[2], x, y, x, y, inf)))
     return (-depth if overlap else sqrt(squared)) - radii[0] - radii[1]

@@ -22,7 +22,7 @@ from coop_drake.diagram.knowledge import arrival_goal
 from coop_drake.geometry.polygons import BoundaryDistance
 from coop_drake.harmonic_maps import HarmonicMap
 from coop_drake.laws import readiness
-from coop_drake.laws.axis_table import ENERGY_BOUND, REST_RATE, axis_table, track_row
+from coop_drake.laws.axis_table import REST_RATE, axis_table
 from coop_drake.laws.ppc import governed_gains
 from coop_drake.plant import TeamPlant, read_component_tree
 from coop_drake.plant.facts import scenario_digest
@@ -231,42 +231,30 @@ def _axes(plan: Plan) -> tuple[str, ...]:
     return ("the object's angle", *plan.joint_names)
 
 
-def _intervals(plan: Plan, sample: Sample) -> dict[str, float]:
-    transition = plan.transitions[sample.cell]
-    return {
-        f"{name} reaches its goal interval": readiness.interval_margin(position, lower, upper)
-        for name, position, lower, upper in zip(
-            _axes(plan), sample.z[2:], transition.goal_lower, transition.goal_upper, strict=True
-        )
-    }
-
-
 def _readiness(plan: Plan, sample: Sample) -> dict[str, float]:
     following = sample.cell + 1
     gains = plan.transitions[following].gains
     stiffness = governed_gains(plan.governor_row(following), 0.0)[0]
-    margin = cell_margin(
+    margin, _ = cell_margin(
         BoundaryDistance(plan.governed(following)).edges,
         stiffness,
         np.concatenate([sample.z[:3], sample.rates[:3]]),
         sample.governor_position,
     )
-    margins = _intervals(plan, sample) if plan.transitions[sample.cell].gains.rest is None else {}
-    margins["the object's position is safe in the next cell (Delta E)"] = readiness.clearance_margin(
-        margin, stiffness, plan.transitions[sample.cell].inradius
-    )
+    margins = {
+        "the object's position is safe in the next cell (Delta E)": readiness.clearance_margin(
+            margin, stiffness, plan.transitions[sample.cell].inradius
+        )
+    }
     own = axis_table(plan.funnel(sample.cell), plan.transitions[sample.cell].gains)
     table = axis_table(plan.funnel(following), gains)
     for i, name in enumerate(_axes(plan)):
+        inside, slow = readiness.axis_ready(own[i], table[i], sample.z[2 + i], sample.rates[2 + i])
         if own[i, REST_RATE] > 0.0:
-            margins[f"{name} rests in the middle of its goal interval"] = readiness.axis_ready(
-                own[i], table[i], sample.z[2 + i], sample.rates[2 + i]
-            )
-            continue
-        energy = track_row(table[i], 0.0, sample.z[2 + i], sample.rates[2 + i])[1]
-        margins[f"the energy of {name} falls below the next funnel's bound"] = readiness.funnel_margin(
-            energy, table[i, ENERGY_BOUND]
-        )
+            margins[f"{name} rests in the middle of its goal interval"] = min(inside, slow)
+        else:
+            margins[f"{name} reaches its goal interval"] = inside
+            margins[f"the energy of {name} falls below the next funnel's bound"] = slow
     return margins
 
 
@@ -293,7 +281,7 @@ def _arrival(plan: Plan, sample: Sample, goal: readiness.ArrivalGoal) -> dict[st
     speed = float(np.hypot(*sample.rates[:2]))
     margins["the object and the joints come to rest"] = min(
         readiness.position_arrival(0.0, speed, tolerance),
-        readiness.rest_margin(float(np.abs(sample.rates[2:]).max())),
+        1.0 - float(np.abs(sample.rates[2:]).max()) / readiness.RATE_TOLERANCE,
     )
     return margins
 

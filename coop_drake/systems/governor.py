@@ -13,7 +13,7 @@ from coop_drake.answers.budget import PositionTube
 from coop_drake.geometry.polygons import BoundaryDistance
 from coop_drake.harmonic_maps import VelocityField
 from coop_drake.laws.gains import TransitionGains
-from coop_drake.laws.nominal import nominal_flow
+from coop_drake.laws.nominal import nominal_flow, track_nominal
 from coop_drake.laws.ppc import governed_gains
 from coop_drake.systems import kernels
 from coop_drake.systems.block import CLOCK_SIZE, CURRENT_CELL_SIZE, Block, clock_of, index_of
@@ -99,7 +99,7 @@ class ReferenceGovernor(Block):
         current, state = self._current.Eval(context), self._object.Eval(context)
         index = index_of(current, len(self._margin))
         stiffness = self._gains[index](context.get_time() - current[1])[0]
-        output[0] = self._margin[index](stiffness, state, self._governor.Eval(context))
+        output[0] = self._margin[index](stiffness, state, self._governor.Eval(context))[0]
 
 
 @dataclass(frozen=True)
@@ -172,9 +172,9 @@ class NominalGovernor(Block):
         flowing = flow, motion.period, motion.tube.speed
         self._steps = [partial(kernels.step_nominal, *cell.known, *flowing) for cell in cells]
         tracking = motion.tracking_row(cells[0])
-        self._accelerate = partial(kernels.accelerate_along, tracking)
+        self._accelerate = partial(track_nominal, tracking)
         regions = [(cell.clearance.edges, gains.stiffness) for cell in cells]
-        self._margins = [partial(kernels.nominal_margin, *region) for region in regions]
+        self._margins = [partial(kernels.nominal_margins, *region) for region in regions]
         self._shows = [
             partial(kernels.show_nominal, *region, target, *_reports_of(motion))
             for region, target in zip(regions, motion.targets, strict=True)
@@ -203,8 +203,8 @@ class NominalGovernor(Block):
         self._accelerate(measured, state[4:6], state, expected, command[2:])
 
     def _write_margin(self, context: Context, output: BasicVector) -> None:
-        index = index_of(self._current.Eval(context), len(self._margins))
-        output[0] = self._margins[index](self.kept(context)[: kernels.STATE_SIZE])
+        index, state = index_of(self._current.Eval(context), len(self._margins)), self.kept(context)
+        output[0] = self._margins[index](state[:4], state[4:6])[0]
 
     def _write_nominal(self, context: Context, output: BasicVector) -> None:
         index = index_of(self._current.Eval(context), len(self._shows))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from math import hypot, sqrt
 from typing import NamedTuple
 
 import numpy as np
@@ -12,15 +13,15 @@ from coop_drake.harmonic_maps.field import velocity_in_field
 from coop_drake.jit import compiled
 from coop_drake.laws.axis_table import LEAVING_TIME
 from coop_drake.laws.governor import (
+    ATTRACTION_RATE,
+    VELOCITY_STEP,
     driving_margin,
     energy_margin,
     governed_acceleration,
     governor_velocity,
-    object_energy_margin,
     steady_clearance,
     tracking_energy,
 )
-from coop_drake.laws.nominal import excursion, limited_step, reach_of, tracked_acceleration
 from coop_drake.laws.ppc import (
     GOVERNOR_GAIN,
     SMOOTHING,
@@ -33,7 +34,6 @@ from coop_drake.laws.readiness import (
     axis_arrival,
     axis_ready,
     clearance_margin,
-    hand_over_margin,
     position_arrival,
 )
 from coop_drake.tree.pose import FloatArray
@@ -46,17 +46,23 @@ from coop_drake.tree.pose import FloatArray
 @compiled(borrows=True)
 def cell_margin(
     edges: FloatArray, stiffness: float, object_state: FloatArray, governor_position: FloatArray
-) -> float:
-    """Return ``object_energy_margin`` in one cell [m^2/s^2].
+) -> tuple[float, float]:
+    """Return Delta E of (15) in one cell, from velocities in steps of ``VELOCITY_STEP``, and d.
 
     Args:
         edges: Edges of the governed set, shape (edges, 4) [m].
         stiffness: K [1/s^2].
         object_state: Pose and twist of the object, shape (6,).
         governor_position: p_G, shape (2,) [m].
+
+    Returns:
+        Delta E [m^2/s^2] and the signed distance of p_G to the boundary of the governed set [m].
     """
     clearance = signed_distance(edges, governor_position[0], governor_position[1])
-    return object_energy_margin(object_state, governor_position, clearance, stiffness)
+    x, y = object_state[0] - governor_position[0], object_state[1] - governor_position[1]
+    vx = np.rint(object_state[3] / VELOCITY_STEP) * VELOCITY_STEP
+    vy = np.rint(object_state[4] / VELOCITY_STEP) * VELOCITY_STEP
+    return energy_margin(tracking_energy(x, y, vx, vy, stiffness), clearance, stiffness), clearance
 
 
 @compiled(borrows=True)
@@ -92,8 +98,7 @@ def govern(
     ay = governed_acceleration(object_state[1], vy, governor_position[1], gains[0], gains[1])
     damping = speed_damping(ax * vx + ay * vy, vx * vx + vy * vy, limit, gains[1])
     command[2], command[3] = ax - damping * vx, ay - damping * vy
-    clearance = signed_distance(edges, governor_position[0], governor_position[1])
-    margin = object_energy_margin(object_state, governor_position, clearance, gains[0])
+    margin, clearance = cell_margin(edges, gains[0], object_state, governor_position)
     driving = driving_margin(margin, clearance, steady_clearance(limit, *gains), gains[0])
     if driving <= 0.0:  # the map is not evaluated in vain
         command[0], command[1] = 0.0, 0.0
@@ -117,32 +122,26 @@ STATE_SIZE = 6
 
 
 @compiled(borrows=True)
-def nominal_room(edges: FloatArray, stiffness: float, nominal: FloatArray, governor: FloatArray) -> float:
-    """Return d - a of a region, the distance that p_G has left for its next steps [m].
+def nominal_margins(
+    edges: FloatArray, stiffness: float, nominal: FloatArray, governor: FloatArray
+) -> tuple[float, float]:
+    """Return Delta E of (15) with p^ in place of p, and d - a, the distance that p_G has left to go.
 
-    Args:
-        edges: Edges of the region, shape (edges, 4) [m].
-        stiffness: K [1/s^2].
-        nominal: p^ and p^', shape (4,) or longer.
-        governor: p_G, shape (2,) [m].
-    """
-    distance = signed_distance(edges, governor[0], governor[1])
-    x, y = nominal[0] - governor[0], nominal[1] - governor[1]
-    return distance - excursion(x, y, nominal[2], nominal[3], stiffness)
-
-
-@compiled(borrows=True)
-def nominal_margin(edges: FloatArray, stiffness: float, state: FloatArray) -> float:
-    """Return Delta E of (15) with p^ in place of p [m^2/s^2].
+    p^ is no farther than a = root(2 E / K) from p_G until p_G moves.
 
     Args:
         edges: Edges of the governed set, shape (edges, 4) [m].
         stiffness: K [1/s^2].
-        state: p^, p^' and p_G, shape (6,).
+        nominal: p^ and p^', shape (4,) or longer.
+        governor: p_G, shape (2,) [m].
+
+    Returns:
+        Delta E [m^2/s^2] and d - a [m].
     """
-    distance = signed_distance(edges, state[4], state[5])
-    energy = tracking_energy(state[0] - state[4], state[1] - state[5], state[2], state[3], stiffness)
-    return energy_margin(energy, distance, stiffness)
+    distance = signed_distance(edges, governor[0], governor[1])
+    x, y = nominal[0] - governor[0], nominal[1] - governor[1]
+    energy = tracking_energy(x, y, nominal[2], nominal[3], stiffness)
+    return energy_margin(energy, distance, stiffness), distance - sqrt(2.0 * energy / stiffness)
 
 
 @compiled(borrows=True)
@@ -151,6 +150,8 @@ def step_nominal(
     period: float, speed: float, pace: float, state: FloatArray, following: FloatArray,
 ) -> None:  # fmt: skip
     """Write p^, p^' and p_G a period later.
+
+    p_G goes no farther than with its largest speed, and no farther than half of what d - a leaves.
 
     Args:
         row: The governor's row, see ``governed_gains``, shape (9,); K does not change at a hand-over.
@@ -169,42 +170,14 @@ def step_nominal(
         following[i] = governor + flow[0, 0] * off + flow[0, 1] * rate
         following[2 + i] = flow[1, 0] * off + flow[1, 1] * rate
         following[4 + i] = governor
-    stiffness, distance = row[STIFFNESS], signed_distance(edges, state[4], state[5])
-    x, y, rate_x, rate_y = state[0] - state[4], state[1] - state[5], state[2], state[3]
-    room = distance - excursion(x, y, rate_x, rate_y, stiffness)  # as ``nominal_room``
+    margin, room = nominal_margins(edges, row[STIFFNESS], state, state[4:])
     if room > 0.0:
         vx, vy = velocity_in_field(flat, field, state[4], state[5])
-        margin = energy_margin(tracking_energy(x, y, rate_x, rate_y, stiffness), distance, stiffness)
-        vx, vy = governor_velocity(vx, vy, margin, stiffness, row[GOVERNOR_GAIN], row[SMOOTHING])
-        dx, dy = limited_step(pace * vx, pace * vy, period, speed, room)
-        following[4] += dx
-        following[5] += dy
-
-
-@compiled(borrows=True)
-def accelerate_along(
-    gains: FloatArray, object_state: FloatArray, governor: FloatArray, nominal: FloatArray,
-    expected: FloatArray, acceleration: FloatArray,
-) -> None:  # fmt: skip
-    """Write ``tracked_acceleration`` of both coordinates, shape (2,) [m/s^2].
-
-    Args:
-        gains: K, zeta, K_t and zeta_t, shape (4,).
-        object_state: Pose and twist of the object as measured, shape (6,).
-        governor: p_G, shape (2,) [m].
-        nominal: p^ and p^' now, shape (4,) or longer.
-        expected: p^ and p^' when the object was measured, shape (4,) or longer.
-        acceleration: Receives them.
-    """
-    for i in range(2):
-        acceleration[i] = tracked_acceleration(
-            object_state[i],
-            object_state[3 + i],
-            governor[i],
-            (nominal[i], nominal[2 + i]),
-            (expected[i], expected[2 + i]),
-            (gains[0], gains[1], gains[2], gains[3]),
-        )
+        vx, vy = governor_velocity(vx, vy, margin, row[STIFFNESS], row[GOVERNOR_GAIN], row[SMOOTHING])
+        length, allowed = period * hypot(pace * vx, pace * vy), min(period * speed, 0.5 * room)
+        scale = period if length <= allowed else period * allowed / length
+        following[4] += scale * (pace * vx)
+        following[5] += scale * (pace * vy)
 
 
 @compiled(borrows=True)
@@ -213,6 +186,9 @@ def show_nominal(
     state: FloatArray, shown: FloatArray,
 ) -> None:  # fmt: skip
     """Write what ``NOMINAL_SIZE`` lists.
+
+    The field (13) moves p_G by at most ``ATTRACTION_RATE`` times its distance from the target, which with
+    every step can grow by as much.
 
     Args:
         edges: Edges of the governed set, shape (edges, 4) [m].
@@ -226,9 +202,10 @@ def show_nominal(
     """
     for i in range(4):
         shown[i] = state[i]
-    shown[4] = nominal_margin(edges, stiffness, state)
+    shown[4], _ = nominal_margins(edges, stiffness, state, state[4:])
     distance = np.hypot(state[4] - target[0], state[5] - target[1])
-    shown[5] = reach_of(distance, period, periods, speed)
+    growth = (1.0 + ATTRACTION_RATE * period) ** periods - 1.0
+    shown[5] = min(periods * period * speed, distance * growth)
 
 
 # One robot's ready report: the conditions of ``coop_drake.laws.readiness`` on object and joints.
@@ -248,7 +225,7 @@ def nominal_ready(
         nominal: What ``show_nominal`` writes.
         governor: p_G, shape (2,) [m].
     """
-    room = nominal_room(next_edges, next_stiffness, nominal, governor)
+    _, room = nominal_margins(next_edges, next_stiffness, nominal, governor)
     needed = 2.0 * nominal[5]
     return (room - needed) / max(abs(room), needed, 1e-9)
 
@@ -355,8 +332,8 @@ def robot_ready(
         speed = np.hypot(object_state[3], object_state[4])
         margin = position_arrival(distance, speed, tolerance)
     else:
-        energy_margin = cell_margin(next_edges, next_stiffness, object_state, governor_position)
-        margin = clearance_margin(energy_margin, next_stiffness, inradius)
+        margin, _ = cell_margin(next_edges, next_stiffness, object_state, governor_position)
+        margin = clearance_margin(margin, next_stiffness, inradius)
     return min(margin, axes_ready(table, next_table, last, time, object_state, robot))
 
 
@@ -411,8 +388,9 @@ def axes_ready(
         object_state: Pose and twist of the object, shape (6,).
         robot: (z_k, z_k'), shape (2 (3 + n),).
     """
-    n = table.shape[0] - 1
-    margin = 1.0 if last else hand_over_margin(time, table[0, LEAVING_TIME])
+    n, margin, leaving = table.shape[0] - 1, 1.0, table[0, LEAVING_TIME]
+    if not last and leaving > 0.0:
+        margin = min(time / leaving - 1.0, 1.0)
     for i in range(1 + n):
         position, rate = object_state[2], object_state[5]
         if i > 0:
@@ -420,5 +398,6 @@ def axes_ready(
         if last:
             margin = min(margin, axis_arrival(table[i], position, rate))
         else:
-            margin = min(margin, axis_ready(table[i], next_table[i], position, rate))
+            inside, slow = axis_ready(table[i], next_table[i], position, rate)
+            margin = min(margin, inside, slow)
     return margin

@@ -8,14 +8,12 @@ import numpy as np
 from pydrake.systems.framework import BasicVector, Context, DiscreteValues
 from pydrake.systems.primitives import Selector
 
-from coop_drake.jit import compiled
 from coop_drake.laws.measurements import (
     NOTHING,
     carry_measurements,
     observe,
     period_of,
     predict,
-    shift_back,
     uniform_pair,
     wanted_accelerations,
     whole_periods,
@@ -24,35 +22,7 @@ from coop_drake.laws.measurements import (
 from coop_drake.laws.robot_dynamics import estimate_object, motion_room, read_robot
 from coop_drake.plant import RobotPlant, SeparateTeam, TeamPlant, base_chain, robot_chain
 from coop_drake.systems.block import Block, Law, build_selector
-from coop_drake.tree.pose import FloatArray, IntArray
-
-
-@compiled(borrows=True)
-def _read_team(
-    pose: IntArray, first: IntArray, chains: FloatArray, yaws: FloatArray, first_joint: IntArray,
-    joints: IntArray, motion: FloatArray, state: FloatArray, measured: FloatArray,
-) -> None:  # fmt: skip
-    """Write the object's pose, then for every robot what ``read_robot`` writes.
-
-    Args:
-        pose: Where the object's pose stands in the state, shape (3,).
-        first: Row of ``chains`` with which each robot's begin, and the number of rows, shape (N + 1,).
-        chains: From the object to every robot's base.
-        yaws: Angles of the bases in the object where all joints are at zero, shape (N,) [rad].
-        first_joint: As ``first``, of ``joints``.
-        joints: Where all joints stand in the state, then where their rates do, shape (2, n).
-        motion: Room for the motion of the longest chain, see ``motion_room``.
-        state: State of the team.
-        measured: Receives all, shape (3 + 6 N + 2 n,).
-    """
-    for i in range(3):
-        measured[i] = state[pose[i]]
-    at = 3
-    for k in range(yaws.size):
-        own = joints[:, first_joint[k] : first_joint[k + 1]]
-        end = at + 2 * (3 + own.shape[1])
-        read_robot(chains[first[k] : first[k + 1]], yaws[k], own, motion, state, measured[at:end])
-        at = end
+from coop_drake.tree.pose import FloatArray
 
 
 class TeamSensor(Law):
@@ -72,21 +42,20 @@ class TeamSensor(Law):
     """
 
     def __init__(self, team: TeamPlant) -> None:
-        chains = [base_chain(team, robot) for robot in team.robots]
-        known = (
-            team.position_index[:3],
-            np.array([0, *np.cumsum([len(chain.chain) for chain in chains])]),
-            np.vstack([chain.chain for chain in chains]),
-            np.array([chain.yaw for chain in chains]),
-            np.array([0, *np.cumsum([chain.joints.shape[1] for chain in chains])]),
-            np.hstack([chain.joints for chain in chains]),
-            max((motion_room(chain.chain) for chain in chains), key=len),
-        )
+        pose, chains = team.position_index[:3], [base_chain(team, robot) for robot in team.robots]
+        motion = max((motion_room(chain.chain) for chain in chains), key=len)
         #: Sizes of the measurements' parts: the object's, then each robot's.
         self.sizes = [3, *(2 * (3 + chain.joints.shape[1]) for chain in chains)]
+
+        def write(state: FloatArray, measured: FloatArray) -> None:
+            measured[:3], end = state[pose], 3
+            for chain, size in zip(chains, self.sizes[1:], strict=True):
+                begin, end = end, end + size
+                read_robot(chain.chain, chain.yaw, chain.joints, motion, state, measured[begin:end])
+
         super().__init__(
             {"team_state": team.plant.num_multibody_states()},
-            {"measurements": (sum(self.sizes), partial(_read_team, *known))},
+            {"measurements": (sum(self.sizes), write)},
         )
 
 
@@ -179,7 +148,10 @@ class MeasurementNoise(Law):
 
 
 class ShiftedMeasurement(Block):
-    """Shows what there was to measure a part of a period before, or will be after, ``shift_back``.
+    """Shows what there was to measure a part of a period before, or will be after.
+
+    Between two samples, and as much beyond, motions are taken for uniform, so that nothing is shifted by more
+    than the shift times the largest rate in this period.
 
     ======= ============ ==== ===============================================
     input   ``exact``    n    what there is to measure
@@ -204,8 +176,8 @@ class ShiftedMeasurement(Block):
         self.declare_update(self._remember, period, offset)
 
     def _write_measured(self, context: Context, output: BasicVector) -> None:
-        output.SetFromVector(self._exact.Eval(context))
-        shift_back(output.get_mutable_value(), self.kept(context).copy(), self._share)
+        exact = self._exact.Eval(context)
+        output.SetFromVector(exact - self._share * (exact - self.kept(context)))
 
     def _remember(self, context: Context, discrete_state: DiscreteValues) -> None:
         discrete_state.get_mutable_vector().SetFromVector(self._exact.Eval(context))

@@ -68,8 +68,8 @@ class DepartureMonitor(Block):
     ======= ================ ========== ============================================================== =====
 
     State: one discrete group, updated every period: when something was above its level the last time, then
-    p^, p^', x^, x^' and the levels of the axes, of their rates and of where both take them in the last m
-    samples, m being the age of measurements in periods, the latest first.
+    p^, p^', x^, x^', the current cell and the time since its entry in the last m samples, m being the age of
+    measurements in periods, the latest first.
     """
 
     def __init__(self, robot: MonitoredRobot) -> None:
@@ -78,8 +78,7 @@ class DepartureMonitor(Block):
         size = 2 * (2 + robot.mounting.size)
         motion = motion_room(robot.chain)
         self._estimate = partial(estimate_object, robot.chain, robot.p_LE, motion)
-        known = robot.chain, robot.p_LE, robot.mounting, motion
-        self._largest = partial(readiness.largest_departure, *known)
+        self._largest = partial(readiness.largest_departure, robot.p_LE, robot.mounting, motion[-1])
         self._state = self.DeclareVectorInputPort("robot_state", size)
         self._pose = self.DeclareVectorInputPort("object_pose", 3)
         self._led = self.DeclareVectorInputPort("nominal", NOMINAL_SIZE)
@@ -101,29 +100,28 @@ class DepartureMonitor(Block):
             axes: x^ of the axes that have a nominal motion [rad or m].
             cell: Index of the cell.
         """
-        levels = self._robot.axis_alarms[cell, 0].ravel()
-        row = np.concatenate([position, [0.0, 0.0], axes[: self._axes], np.zeros(self._axes), levels])
+        row = np.array([*position, 0.0, 0.0, *axes[: self._axes], *[0.0] * self._axes, cell, 0.0])
         return np.concatenate([[LONG_AGO], *[row] * self._robot.measurement_periods])
 
     def _now(self, context: Context) -> FloatArray:
-        """Return p^, p^', x^, x^' and the levels of now, shape (4 + 5 axes,)."""
+        """Return p^, p^', x^, x^', the cell and the time since its entry, shape (6 + 2 axes,)."""
         led = self._led.Eval(context)[:4]
         if not self._axes:
-            return led
-        alarms, cell = self._robot.axis_alarms, self._cell.Eval(context)
-        index = index_of(cell, len(alarms))
-        stage = readiness.alarm_stage(self._robot.alarm_times[index], context.get_time() - cell[1])
-        return np.concatenate([led, self._led_axes.Eval(context), alarms[index, stage].ravel()])
+            return np.array([*led, 0.0, 0.0])
+        cell = self._cell.Eval(context)
+        index = index_of(cell, len(self._robot.axis_alarms))
+        return np.array([*led, *self._led_axes.Eval(context), index, context.get_time() - cell[1]])
 
     def _write_alarm(self, context: Context, output: BasicVector) -> None:
-        past = self.kept(context)
-        then = past[-(4 + 5 * self._axes) :] if self._robot.measurement_periods else self._now(context)
+        past, robot = self.kept(context), self._robot
+        then = past[-(6 + 2 * self._axes) :] if robot.measurement_periods else self._now(context)
         measured, seen = self._state.Eval(context), np.empty(6)
         self._estimate(measured, self._pose.Eval(context), seen)
-        of_axes = then[4:].reshape(5, -1) if self._axes else np.empty((5, 0))
-        axes, levels = of_axes[:2], of_axes[2:]
-        known = self._robot.levels, levels, self._robot.unseen
-        share, which = self._largest(measured, seen, then[:4].copy(), axes, *known)
+        axes, cell = then[4:-2].reshape(2, -1).copy(), int(then[-2])
+        stages = robot.alarm_times[cell], robot.axis_alarms[cell], float(then[-1])
+        share, which = self._largest(
+            measured, seen, then[:4].copy(), axes, robot.levels, *stages, robot.unseen
+        )
         output.SetFromVector(
             [readiness.alarm_at(share, context.get_time(), float(past[0])), share, float(which)]
         )

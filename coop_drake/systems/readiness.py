@@ -7,7 +7,7 @@ from functools import partial
 
 from pydrake.systems.framework import BasicVector, Context, DiscreteValues, EventStatus
 
-from coop_drake.laws.readiness import quiet_margin
+from coop_drake.laws.readiness import FAR, QUIET
 from coop_drake.systems import kernels
 from coop_drake.systems.block import ALARM_SIZE, CURRENT_CELL_SIZE, READY_SIZE, Block, index_of
 from coop_drake.systems.governor import GovernedCell
@@ -102,7 +102,8 @@ class ReadyMonitor(Block):
             time, governor = context.get_time() - current[1], self._governor.Eval(context)
             report[1] = self._ready[index](time, seen, robot, governor, led)
         if self._alarm is not None:
-            report[1] = quiet_margin(report[1], self._alarm.Eval(context)[0])
+            quiet = self._alarm.Eval(context)[0] == QUIET
+            report[1] = report[1] if quiet else min(report[1], FAR)
 
 
 class CellPlanner(Block):

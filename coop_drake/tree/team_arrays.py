@@ -49,7 +49,6 @@ def moved(x: float, y: float, c: float, s: float, u: float, v: float) -> tuple[f
     return x + c * u - s * v, y + s * u + c * v
 
 
-@compiled
 def place(team: TeamArrays, z: FloatArray) -> FloatArray:
     """Compute the pose ``X_WC`` of every component, eq. (3).
 

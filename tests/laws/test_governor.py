@@ -7,8 +7,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
+from shapely import box
 
 from coop_drake import laws
+from coop_drake.geometry.polygons import edges_of
 from coop_drake.laws.axis_table import (
     GOAL_LOWER,
     GOAL_UPPER,
@@ -19,13 +21,10 @@ from coop_drake.laws.axis_table import (
     write_jumps,
 )
 from coop_drake.laws.gains import RestCondition, schedule_of
-from coop_drake.laws.governor import (
-    ATTRACTION_RATE,
-    VELOCITY_STEP,
-    object_energy_margin,
-)
+from coop_drake.laws.governor import ATTRACTION_RATE, VELOCITY_STEP
 from coop_drake.laws.ppc import STEEPEST, fading, governed_gains, shortest_hand_over
 from coop_drake.scenario import SimulatorSettings
+from coop_drake.systems.kernels import cell_margin
 
 K, K_G = 50.0, 5.0
 
@@ -63,14 +62,13 @@ def test_a_target_is_approached_no_faster_than_the_integrator_can_follow():
 def test_the_loops_margin_is_the_law_with_velocities_in_steps():
     state, governor = np.array([1.0, 2.0, 0.3, 0.2, -0.1, 0.4]), np.array([1.1, 1.95])
     vx, vy = np.round(state[3:5] / VELOCITY_STEP) * VELOCITY_STEP
+    edges = edges_of(box(0.0, 0.0, 1.5, 9.0))  # p_G is 0.4 from them
     expected = laws.energy_margin(laws.tracking_energy(1.0 - 1.1, 2.0 - 1.95, vx, vy, K), 0.4, K)
-    assert object_energy_margin(state, governor, 0.4, K) == expected
+    assert cell_margin(edges, K, state, governor) == pytest.approx((expected, 0.4), rel=1e-13)
     assert abs(state[3:5] - [vx, vy]).max() <= 0.5 * VELOCITY_STEP
     # Rounding of the measured velocity does not reach the margin.
-    assert (
-        object_energy_margin(state * (1.0 + 1e-14 * np.array([0, 0, 0, 1, -1, 1])), governor, 0.4, K)
-        == expected
-    )
+    rounded = state * (1.0 + 1e-14 * np.array([0, 0, 0, 1, -1, 1]))
+    assert cell_margin(edges, K, rounded, governor) == cell_margin(edges, K, state, governor)
 
 
 def test_accelerations_and_energies_by_hand():

@@ -18,16 +18,29 @@ from tests.support.planar_arm import random_arm, random_state
 from tests.support.robot_matrices import robot_acceleration
 
 
+def wave(number, size, length, phase):
+    """The wave alone, without noise."""
+    error = np.empty(1)
+    measurements.write_errors(9, np.zeros(1), np.array([[size, length, phase]]), number, error)
+    return error[0]
+
+
+def write_normals(seed, number, normals):
+    """The noise alone, with a deviation of one."""
+    n = len(normals)
+    measurements.write_errors(seed, np.ones(n), np.tile([0.0, 2.0, 0.0], (n, 1)), number, normals)
+
+
 @pytest.mark.parametrize(
     ("phase", "signs"), [(0.0, "++--++--"), (0.25, "+--++--+"), (0.5, "--++--++"), (1.0, "++--++--")]
 )
 def test_a_wave_is_positive_in_its_first_half(phase, signs):
-    values = [measurements.square_wave(number, 0.2, 4.0, phase) for number in range(8)]
+    values = [wave(number, 0.2, 4.0, phase) for number in range(8)]
     assert values == [0.2 if sign == "+" else -0.2 for sign in signs]
 
 
 def test_a_wave_that_is_no_whole_number_of_periods_has_the_right_mean_length():
-    values = np.array([measurements.square_wave(number, 1.0, 7.3, 0.1) for number in range(7300)])
+    values = np.array([wave(number, 1.0, 7.3, 0.1) for number in range(7300)])
     assert np.count_nonzero(np.diff(values) > 0.0) == int(7299 / 7.3 + 0.1)
     assert abs(values.mean()) < 0.02
 
@@ -40,7 +53,7 @@ def test_noise_and_waves_add_up_and_neither_acts_where_it_is_not_asked_for():
     errors, drawn = np.empty(3), np.empty(3)
     for number in range(4):
         measurements.write_errors(9, deviations, waves, number, errors)
-        measurements.write_normals(9, number, drawn)
+        write_normals(9, number, drawn)
         sign = 1.0 if number % 2 == 0 else -1.0
         np.testing.assert_allclose(errors, deviations * drawn + sign * waves[:, 0], atol=1e-15)
 
@@ -74,7 +87,7 @@ def test_pairs_are_uniform_and_independent():
 def test_normals_have_the_moments_of_a_normal_distribution():
     drawn = np.empty((4000, 7))
     for k in range(len(drawn)):
-        measurements.write_normals(3, k, drawn[k])
+        write_normals(3, k, drawn[k])
     np.testing.assert_allclose(drawn.mean(axis=0), 0.0, atol=0.08)
     np.testing.assert_allclose(np.cov(drawn.T), np.eye(7), atol=0.1)
     np.testing.assert_allclose((drawn**4).mean(axis=0), 3.0, atol=0.6)
@@ -82,14 +95,14 @@ def test_normals_have_the_moments_of_a_normal_distribution():
 
 def test_seed_and_number_decide_and_nothing_else():
     first, again, shorter, other = np.empty(5), np.empty(5), np.empty(3), np.empty(5)
-    measurements.write_normals(1, 2**40, first)
-    measurements.write_normals(1, 5, other)
-    measurements.write_normals(1, 2**40, again)
-    measurements.write_normals(1, 2**40, shorter)
+    write_normals(1, 2**40, first)
+    write_normals(1, 5, other)
+    write_normals(1, 2**40, again)
+    write_normals(1, 2**40, shorter)
     np.testing.assert_array_equal(first, again)
     np.testing.assert_array_equal(first[:3], shorter)
     assert not np.any(first == other)
-    measurements.write_normals(2, 2**40, other)
+    write_normals(2, 2**40, other)
     assert not np.any(first == other)
 
 

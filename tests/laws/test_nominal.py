@@ -8,12 +8,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pydrake.systems.framework import DiagramBuilder
 from scipy.integrate import solve_ivp
+from shapely import box
 
+from coop_drake.geometry.polygons import edges_of
 from coop_drake.laws import nominal
 from coop_drake.laws.governor import governed_acceleration
 from coop_drake.laws.robot_dynamics import motion_room, read_robot
 from coop_drake.plant import base_chain, build_team_plant
 from coop_drake.scenario import load_scenario
+from coop_drake.systems.kernels import nominal_margins, show_nominal
 
 coordinates = st.floats(-1.0, 1.0)
 
@@ -38,43 +41,45 @@ def test_the_flow_solves_the_equation_of_motion(damping):
 @given(gains, coordinates, coordinates, coordinates, coordinates)
 def test_the_excursion_never_grows_while_the_reference_rests(gains, x, y, vx, vy):
     stiffness, damping = gains
-    flow, before = nominal.nominal_flow(stiffness, damping, 0.005), nominal.excursion(x, y, vx, vy, stiffness)
+    edges, target = edges_of(box(-9.0, -9.0, 9.0, 9.0)), np.zeros(2)
+
+    def excursion():
+        return 9.0 - nominal_margins(edges, stiffness, np.array([x, y, vx, vy]), target)[1]
+
+    flow, before = nominal.nominal_flow(stiffness, damping, 0.005), excursion()
     first = before
     for _ in range(200):
         (x, vx), (y, vy) = flow @ (x, vx), flow @ (y, vy)
-        after = nominal.excursion(x, y, vx, vy, stiffness)
+        after = excursion()
         assert after <= before * (1.0 + 1e-12) + 1e-15
         assert hypot(x, y) <= first * (1.0 + 1e-9) + 1e-15
         before = after
 
 
-@settings(max_examples=60)
-@given(coordinates, coordinates, st.floats(-0.1, 0.5), st.floats(0.05, 2.0))
-def test_a_step_is_no_longer_than_allowed_and_keeps_its_direction(vx, vy, room, speed):
-    dx, dy = nominal.limited_step(vx, vy, 0.005, speed, room)
-    assert hypot(dx, dy) <= min(0.005 * speed, 0.5 * max(room, 0.0)) * (1.0 + 1e-12)
-    assert dx * vy == pytest.approx(dy * vx, abs=1e-12)
-    assert dx * vx + dy * vy >= 0.0
-    free = nominal.limited_step(vx, vy, 0.005, 10.0, 10.0)
-    assert free == (0.005 * vx, 0.005 * vy)
-
-
 def test_no_way_is_longer_than_the_reach():
     """p_G that always flees from its target as quickly as the field could move it."""
+    edges, shown = edges_of(box(-9.0, -9.0, 9.0, 9.0)), np.empty(6)
     for distance, speed in ((0.001, 1.0), (0.05, 1.0), (0.5, 0.3)):
+        state = np.array([0.0, 0.0, 0.0, 0.0, distance, 0.0])
         way, off = 0.0, distance
         for periods in range(1, 9):
             step = min(0.005 * speed, 0.005 * 30.0 * off)
             way, off = way + step, off + step
-            assert way <= nominal.reach_of(distance, 0.005, float(periods), speed) * (1.0 + 1e-12)
+            show_nominal(edges, 100.0, np.zeros(2), 0.005, float(periods), speed, state, shown)
+            assert way <= shown[5] * (1.0 + 1e-12)
 
 
 def test_on_the_nominal_motion_the_object_accelerates_as_it_does():
-    own = governed_acceleration(0.1, 0.2, 0.15, 100.0, 14.0)
-    same = (0.1, 0.2)
-    assert nominal.tracked_acceleration(0.1, 0.2, 0.15, same, same, (100.0, 14.0, 250.0, 30.0)) == own
-    off = nominal.tracked_acceleration(0.11, 0.2, 0.15, same, same, (100.0, 14.0, 250.0, 30.0))
-    assert off == pytest.approx(own - 2.5)
+    own = (
+        governed_acceleration(0.1, 0.2, 0.15, 100.0, 14.0),
+        governed_acceleration(0.3, -0.1, 0.2, 100.0, 14.0),
+    )
+    gains, governor, same = np.array([100.0, 14.0, 250.0, 30.0]), np.array([0.15, 0.2]), np.empty(2)
+    led, state, off = np.array([0.1, 0.3, 0.2, -0.1]), np.array([0.1, 0.3, 7.0, 0.2, -0.1, 7.0]), np.empty(2)
+    nominal.track_nominal(gains, state, governor, led, led, same)
+    assert tuple(same) == own
+    nominal.track_nominal(gains, state + 0.01 * np.array([1, 0, 0, 0, 10, 0]), governor, led, led, off)
+    np.testing.assert_allclose(off - same, [-2.5, -3.0])
 
 
 @pytest.mark.parametrize("lag", [0.0, 0.003])
@@ -92,8 +97,16 @@ def test_a_period_is_carried_as_the_differential_equation_says(lag):
 
 
 def test_the_pull_is_that_of_a_spring_and_a_damper():
-    assert nominal.pulled_axis(1.5, 0.3, -0.2, (0.3, -0.2), (400.0, 30.0)) == 1.5
-    assert nominal.pulled_axis(1.5, 0.31, -0.1, (0.3, -0.2), (400.0, 30.0)) == pytest.approx(1.5 - 4.0 - 3.0)
+    law, expected, pulled = np.array([1.5, 2.5]), np.array([[0.3, 0.6], [-0.2, 0.4]]), np.empty(2)
+    state, robot = (
+        np.array([7.0, 7.0, 0.3, 7.0, 7.0, -0.2]),
+        np.array([7.0, 7.0, 7.0, 0.6, 7.0, 7.0, 7.0, 0.4]),
+    )
+    nominal.pull_axes(law, state, robot, expected, (400.0, 30.0), pulled)
+    assert pulled.tolist() == [1.5, 2.5]
+    state[[2, 5]], robot[[3, 7]] = [0.31, -0.1], [0.61, 0.4]
+    nominal.pull_axes(law, state, robot, expected, (400.0, 30.0), pulled)
+    assert pulled == pytest.approx([1.5 - 4.0 - 3.0, 2.5 - 4.0])
 
 
 def test_the_base_of_every_robot_turns_with_the_object_and_against_its_joints():

@@ -14,6 +14,7 @@ from coop_drake.laws.axis_table import (
     RATE_LIMIT,
     axis_table,
     bounds_of,
+    gains_of,
     limited_row,
     slope_bounds,
     track_row,
@@ -188,17 +189,25 @@ def test_after_the_settling_time_the_clock_has_its_final_pace():
     assert ppc.lagging_clock(ppc.SETTLING_TIME, 0.0, np.array([1.0, 1.0, 0.0]))[1] < 1e-3
 
 
-@pytest.mark.parametrize("quintic", [True, False])
-def test_rates_of_slowed_bounds_are_their_derivatives(quintic):
-    funnel, start, h = (-1.0, 0.8, -0.2, 0.1, 3.0, quintic), np.array([0.6, 0.3, 0.05]), 1e-5
+@pytest.mark.parametrize("shape", ["quintic", "exponential"])
+def test_on_a_slowed_clock_the_law_tracks_the_bounds_as_they_move(shape):
+    """The law on the clock is the law of bounds and gains whose rates are their derivatives by time."""
+    axis, start, h = row(shape), np.array([0.6, 0.3, 0.05]), 1e-5
 
     def at(time):
         _, b, b_rate, lost = ppc.lagging_clock(time, 1.0, start)
-        return ppc.slowed_bounds(ppc.axis_bounds(0.4 + time - lost, *funnel), 1.0 - b, -b_rate)
+        return 0.4 + time - lost, 1.0 - b, -b_rate
 
-    before, now, after = (np.array(at(0.1 + step)) for step in (-h, 0.0, h))
-    np.testing.assert_allclose(now[2:4], (after[:2] - before[:2]) / (2.0 * h), atol=1e-7)
-    np.testing.assert_allclose(now[4:], (after[2:4] - before[2:4]) / (2.0 * h), atol=1e-6)
+    def moving(time):
+        return np.array([*bounds_of(axis, at(time)[0])[:2], gains_of(axis, at(time)[0])[1]])
+
+    before, now, after = (moving(0.1 + step) for step in (-h, 0.0, h))
+    rates, bending = (after - before) / (2.0 * h), (after - 2.0 * now + before) / h**2
+    kappa, _, _, k2, saturation = gains_of(axis, at(0.1)[0])
+    bounds = (*now[:2], *rates[:2], *bending[:2])
+    expected = ppc.track_axis(0.07, 0.3, bounds, (kappa, now[2], rates[2], k2, saturation))
+    tau, pace, pace_rate = at(0.1)
+    assert track_row(axis, tau, 0.07, 0.3, pace, pace_rate) == pytest.approx(expected, rel=1e-4)
 
 
 limits, gains = st.floats(0.05, 5.0), st.floats(0.5, 60.0)
@@ -263,7 +272,7 @@ def test_a_slowed_funnel_moves_at_a_share_of_the_limit(quintic):
     times = np.linspace(0.0, 10.0, 20001)
     fastest = max(abs(ppc.decay_factor(float(t), rate, quintic)[1]) for t in times) * shrink
     assert fastest == pytest.approx(ppc.FUNNEL_SHARE * limit, rel=1e-4)
-    assert ppc.funnel_rate(rate, shrink, quintic) == pytest.approx(fastest, rel=1e-4)
+    assert ppc.funnel_rate(np.array([rate]), shrink, quintic) == pytest.approx([fastest], rel=1e-4)
     assert ppc.slowed_decay_rate(13.0, shrink, quintic, np.inf) == 13.0
     assert ppc.slowed_decay_rate(1e-3, shrink, quintic, limit) == 1e-3
 

@@ -9,7 +9,7 @@ from coop_drake.laws import Funnel, ScheduledGains, transition_gains
 from coop_drake.laws.axis_table import FADING_TIME, axis_table, bounds_of, track_row
 from coop_drake.laws.nominal import carry_axes
 from coop_drake.laws.ppc import fading
-from coop_drake.robustness.funnel_law import fit_law, law_memory
+from coop_drake.robustness.funnel_law import MEMORY, fit_law
 from coop_drake.robustness.nominal_axes import (
     DISTANCE,
     V_REACH,
@@ -37,7 +37,7 @@ def test_the_law_is_its_line_within_the_rest(reach):
     for time in (0.0, 0.3, 2.0):
         lower, upper = bounds_of(row, time)[:2]
         x, v = lower + 0.4 * (upper - lower), 0.2
-        slope, by_rate, rest, spread = fit_law(row, time, x, reach, v, law_memory())
+        slope, by_rate, rest, spread = fit_law(row, time, x, reach, v, np.empty(MEMORY))
         middle = track_row(row, time, x, v)[0]
         for a, b in generator.uniform(-1.0, 1.0, (200, 2)) * [reach, 0.3]:
             change = track_row(row, time, x + a, v + b)[0] - middle

@@ -13,7 +13,6 @@ from coop_drake.answers.budget import Budget
 from coop_drake.cli import app
 from coop_drake.cli.task import read_task
 from coop_drake.diagram.knowledge import axis_levels
-from coop_drake.laws.readiness import alarm_stage
 from coop_drake.planning.planner import plan
 from coop_drake.plant.facts import budget_of, scenario_budgets
 from coop_drake.robustness.alarms import unseen_of
@@ -78,7 +77,8 @@ def least_room_after(base, factor, side):
         for k in kicked:
             heard = max(k - generator.integers(2), 0)  # robots hear of a switch one period late
             cell, since = int(places[heard, 0]), places[heard, 1] * budget.period
-            a, b, c = factor * levels[cell, alarm_stage(times[cell], since)]
+            stage = max(np.searchsorted(times[cell], since, side="right") - 1, 0)
+            a, b, c = factor * levels[cell, stage]
             x = generator.choice([-1.0, 0.0, 1.0, generator.uniform(-1.0, 1.0)]) * a
             rate = np.clip((side * c - x) / t, -b, b)
             errors[k, :, 3] = np.clip(x, -c - t * rate, c - t * rate) + side * hidden[0]

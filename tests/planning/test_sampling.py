@@ -40,7 +40,6 @@ from coop_drake.planning.sampling.collision import (
     grid_inside,
     is_free,
     lay_grid,
-    square_at,
     team_clearance,
 )
 from coop_drake.planning.sampling.narrow_passages import (
@@ -221,19 +220,9 @@ def test_middles_lie_inside_where_the_floor_is(name: str) -> None:
     assert grid.inside.any()
 
 
-def test_points_find_their_square_or_none() -> None:
-    grid = lay_grid(polygon_rings(room()), 0.4)
-    for square in range(0, grid.rows * grid.columns, 7):
-        assert square_at(grid, *middle(grid, square)) == divmod(square, grid.rows)
-    end = grid.corner + grid.side * np.array([grid.columns, grid.rows])
-    for x, y in [grid.corner - 1e-6, end + 1e-6, (grid.corner[0] - 5.0, end[1] - 0.1)]:
-        assert square_at(grid, x, y) == (-1, -1)
-
-
 def test_a_floor_without_rings_has_no_squares() -> None:
     grid = lay_grid([], 0.5)
-    assert len(grid.edges) == 0
-    assert square_at(grid, 0.0, 0.0) == (-1, -1)
+    assert len(grid.edges) == grid.rows == grid.columns == 0
 
 
 @pytest.mark.parametrize("reach", [0.2, 1.5])

@@ -15,14 +15,15 @@ from pydrake.systems.primitives import Demultiplexer
 from coop_drake.answers.log import SimulationLog
 from coop_drake.compiled_loop import CompiledTransport, arrays
 from coop_drake.compiled_loop.loop import update
-from coop_drake.compiled_loop.robots import compute, heard_cell, read_own
+from coop_drake.compiled_loop.robots import compute, heard_cell
 from coop_drake.compiled_loop.running import believed, departures_of, memory_of, nominal_of
 from coop_drake.compiled_loop.watching import left_by_all
 from coop_drake.diagram import station as stations
 from coop_drake.jit import compiled
 from coop_drake.laws.actuators import lag_behind
-from coop_drake.laws.axis_table import write_bounds
+from coop_drake.laws.axis_table import bounds_of
 from coop_drake.laws.measurements import period_of
+from coop_drake.laws.robot_dynamics import read_robot
 from coop_drake.plant import build_team_plant
 from coop_drake.plant.team import displacement
 from coop_drake.scenario import Deployment, Scenario
@@ -30,7 +31,7 @@ from coop_drake.simulation import run_loop
 from coop_drake.systems import Block
 from coop_drake.systems.block import ALARM_SIZE
 from coop_drake.systems.departures import tilt_floor
-from coop_drake.systems.kernels import nominal_margin
+from coop_drake.systems.kernels import nominal_margins
 from coop_drake.tree.pose import FloatArray
 
 SHOWN = 20
@@ -65,19 +66,20 @@ def tell(
         row, begin = shown[k], k + team.first[2, k]
         end = begin + 1 + team.first[2, k + 1] - team.first[2, k]
         heard, time = heard_cell(k, sample, now, departures.hearing, memory.current)
-        read_own(k, team.places, team.first, team.base_chains, team.yaws[k], room.motion, memory.state, robot)
+        joints = team.places[:, 3 + team.first[2, k] : 3 + team.first[2, k + 1]]
+        base = team.base_chains[team.first[1, k] : team.first[1, k + 1]]
+        read_robot(base, team.yaws[k], joints, room.motion, memory.state, robot)
         row[POSE : POSE + 3] = robot[:3]
         row[GOVERNOR : GOVERNOR + 2] = led[4:6] if nominal.flow.size else governors[k]
         row[MARGIN] = room.told[k, arrays.ENERGY]
         if nominal.flow.size:
             edges = cells.governed[cells.first[0, heard] : cells.first[0, heard + 1]]
-            row[MARGIN] = nominal_margin(edges, cells.numbers[heard, 1], led)
+            row[MARGIN], _ = nominal_margins(edges, cells.numbers[heard, 1], led, led[4:6])
         row[READY : READY + 2] = memory.reports[0, k]
         row[ALARM : ALARM + 3] = memory.alarms[k, :3]
         row[WANTED:] = room.told[k, arrays.ACCELERATION : arrays.COMMAND + 6]
-        own = np.empty(2 * (end - begin))
-        write_bounds(cells.tables[heard, begin:end], time, own)
-        bounds[0, begin:end], bounds[1, begin:end] = own[: end - begin], own[end - begin :]
+        for i in range(begin, end):
+            bounds[0, i], bounds[1, i] = bounds_of(cells.tables[heard, i], time)[:2]
 
 
 class SampledTeam(Block):

@@ -13,12 +13,12 @@ from coop_drake import systems
 from coop_drake.answers.budget import AxisTracking
 from coop_drake.diagram.knowledge import robot_knowledge
 from coop_drake.laws import funnel_bounds, governed_acceleration, governor_velocity
-from coop_drake.laws.governor import energy_margin, object_energy_margin, tracking_energy
-from coop_drake.laws.nominal import carry_axes, nominal_flow, pulled_axis, tracked_acceleration
+from coop_drake.laws.governor import VELOCITY_STEP, energy_margin, tracking_energy
+from coop_drake.laws.nominal import carry_axes, nominal_flow
 from coop_drake.laws.ppc import ramped_gain
 from coop_drake.plant import build_team_plant
 from coop_drake.simulation import build_maps
-from coop_drake.systems.kernels import nominal_room
+from coop_drake.systems.kernels import nominal_margins
 from tests.support.prescribed import prescribed_acceleration
 from tests.support.small_loop import governed_cells
 from tests.support.small_plan import small_plan
@@ -56,7 +56,9 @@ def test_outputs_are_the_law_of_the_current_cell(cells, index):
     governor, state = np.array([4.1, 3.15]), np.array([4.15, 3.2, 0.3, 0.2, -0.1, 0.4])
     inputs = {"object_state": state, "governor_position": governor, "current_cell": [index, 2.0]}
     system, cell, gains = systems.ReferenceGovernor(cells), cells[index], cells[index].gains
-    margin = object_energy_margin(state, governor, cell.clearance(governor), gains.stiffness)
+    rates = np.rint(state[3:5] / VELOCITY_STEP) * VELOCITY_STEP
+    energy = tracking_energy(*(state[:2] - governor), *rates, gains.stiffness)
+    margin = energy_margin(energy, cell.clearance(governor), gains.stiffness)
     np.testing.assert_allclose(evaluate(system, inputs, "energy_margin"), [margin], rtol=1e-15)
     velocity, acceleration = np.split(evaluate(system, inputs, "governor_command"), 2)
     pulled = governed_acceleration(state[:2], state[3:5], governor, gains.stiffness, gains.damping)
@@ -223,7 +225,7 @@ def test_the_nominal_motion_never_leaves_its_region_and_the_reference_keeps_its_
     (cells, motion), system = known(), systems.NominalGovernor(*known())
     states = stepped(system, context_with(system, at_place()), 600)
     rooms = [
-        nominal_room(cells[0].clearance.edges, cells[0].gains.stiffness, state[:4], state[4:6])
+        nominal_margins(cells[0].clearance.edges, cells[0].gains.stiffness, state[:4], state[4:6])[1]
         for state in states
     ]
     assert min(rooms) >= 0.0
@@ -239,9 +241,8 @@ def test_the_command_compares_measurements_with_the_nominal_state_of_their_time(
     command = system.GetOutputPort("governor_command").Eval(context)
     now, then = states[-1], states[-3]
     for i, place in enumerate((3.0, 3.0)):
-        expected = tracked_acceleration(
-            place, 0.0, now[4 + i], (now[i], now[2 + i]), (then[i], then[2 + i]), tuple(gains)
-        )
+        expected = governed_acceleration(now[i], now[2 + i], now[4 + i], *gains[:2])
+        expected += governed_acceleration(place - then[i], -then[2 + i], 0.0, *gains[2:])
         assert command[2 + i] == pytest.approx(expected, rel=1e-12)
         assert command[i] == pytest.approx((now[4 + i] - states[-2][4 + i]) / motion.period)
 
@@ -351,7 +352,7 @@ def test_measurements_are_compared_with_the_motion_of_their_time(periods):
         past.append(context.get_discrete_state_vector().CopyToVector()[:6].reshape(2, 3))
     expected, seen = past[-1 - periods], ((0.41, 0.3), (-0.21, 0.04), (0.69, -0.05))
     pulled = [
-        pulled_axis(law, x, v, tuple(expected[:, i]), (500.0, 38.0))
+        law + governed_acceleration(x - expected[0, i], v - expected[1, i], 0.0, 500.0, 38.0)
         for i, (law, (x, v)) in enumerate(zip((1.0, -2.0, 3.0), seen, strict=True))
     ]
     np.testing.assert_allclose(system.GetOutputPort("pulled_axes").Eval(context), pulled, rtol=1e-14)

@@ -125,15 +125,6 @@ def lay_grid(rings: Sequence[FloatArray], reach: float) -> ObstacleGrid:
     return ObstacleGrid(edges, corner, side, rows, columns, reach, first, listed, away, inside)
 
 
-@compiled(borrows=True)
-def square_at(grid: ObstacleGrid, x: float, y: float) -> tuple[int, int]:
-    """Column and row of the square that holds a point, -1 for both if none does."""
-    column, row = np.floor((x - grid.corner[0]) / grid.side), np.floor((y - grid.corner[1]) / grid.side)
-    if column < 0 or row < 0 or column >= grid.columns or row >= grid.rows:
-        return -1, -1
-    return int(column), int(row)
-
-
 @compiled
 def _lists(
     edges: FloatArray, corner: FloatArray, side: float, rows: int, columns: int, radius: float
@@ -267,10 +258,10 @@ def ring_clearance(
         most: Distances above this one do not matter [m].
     """
     x, y, reach = px + c * disc[0] - s * disc[1], py + s * disc[0] + c * disc[1], disc[2]
-    column, row = square_at(grid, x, y)
-    if column < 0:
+    column, row = np.floor((x - grid.corner[0]) / grid.side), np.floor((y - grid.corner[1]) / grid.side)
+    if column < 0 or row < 0 or column >= grid.columns or row >= grid.rows:
         return -1.0
-    square = column * grid.rows + row
+    square = int(column) * grid.rows + int(row)
     mx, my = grid.corner[0] + (column + 0.5) * grid.side, grid.corner[1] + (row + 0.5) * grid.side
     off = sqrt((x - mx) * (x - mx) + (y - my) * (y - my))
     near = reach <= grid.reach
@@ -391,7 +382,6 @@ def team_clearance(
     return best
 
 
-@compiled
 def is_free(team: TeamArrays, grid: ObstacleGrid, z: FloatArray, gap: float) -> bool:
     """Whether a configuration touches no wall and no two bodies come closer than the gap.
 
@@ -401,7 +391,8 @@ def is_free(team: TeamArrays, grid: ObstacleGrid, z: FloatArray, gap: float) -> 
         z: (x, y, theta, q...), shape (3 + n,).
         gap: Distance that pairs of bodies must keep [m].
     """
-    return is_free_placed(team, grid, z, gap, np.empty((len(team.links), 5)))
+    free: bool = is_free_placed(team, grid, z, gap, np.empty((len(team.links), 5)))
+    return free
 
 
 @compiled(borrows=True)
@@ -413,14 +404,15 @@ def is_free_placed(
     return team_clearance(team, grid, poses, 0.0, ALL) >= 0.0 and bodies_apart(team, poses, gap, ALL)
 
 
-@compiled(borrows=True)
+@compiled
 def first_collision(team: TeamArrays, grid: ObstacleGrid, path: FloatArray, gap: float) -> int:
     """Index of the first configuration of a path, shape (m, 3 + n), that is not free; m if all of them are.
 
     The other arguments are those of ``is_free``.
     """
+    poses = np.empty((len(team.links), 5))
     for k in range(len(path)):
-        if not is_free(team, grid, path[k], gap):
+        if not is_free_placed(team, grid, path[k], gap, poses):
             return k
     return len(path)
 

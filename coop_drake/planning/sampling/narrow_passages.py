@@ -19,7 +19,7 @@ from coop_drake.planning.sampling.band import clearances, improved
 from coop_drake.planning.sampling.collision import densified, first_collision, grid_for_team, is_free
 from coop_drake.tree.component_tree import configuration_scale
 from coop_drake.tree.pose import FloatArray, IntArray
-from coop_drake.tree.team_arrays import TeamArrays, moved, place
+from coop_drake.tree.team_arrays import TeamArrays, moved, place_into
 
 if TYPE_CHECKING:
     from scipy.optimize import LinearConstraint
@@ -57,9 +57,9 @@ class _Vertices(NamedTuple):
 @compiled
 def _places(team: TeamArrays, path: FloatArray) -> FloatArray:
     """Positions of all vertices in W, shape (K, V, 2) [m]."""
-    places = np.empty((len(path), len(team.vertices), 2))
+    places, poses = np.empty((len(path), len(team.vertices), 2)), np.empty((len(team.links), 5))
     for k in range(len(path)):
-        poses = place(team, path[k])
+        place_into(team, path[k], poses)
         for piece in range(len(team.pieces)):
             X = poses[team.pieces[piece, 0]]
             for v in range(team.pieces[piece, 1], team.pieces[piece, 2]):

@@ -19,7 +19,14 @@ from coop_drake.planning.sampling.collision import (
     grid_for_team,
     is_free,
 )
-from coop_drake.planning.sampling.trees import GuidePath, SampledRegion, connect, shortened
+from coop_drake.planning.sampling.trees import (
+    GuidePath,
+    SampledRegion,
+    connect,
+    empty_tree,
+    joined,
+    shortened,
+)
 from coop_drake.tree.component_tree import Body, Component, ComponentTree, ConvexShape, configuration_scale
 from coop_drake.tree.pose import FloatArray
 from coop_drake.tree.team_arrays import TeamArrays, place
@@ -330,9 +337,12 @@ class Sampler:
         upper = np.array([*self._bounds[2:], np.pi, *tree.range_upper])
         circular = np.array([False, False, *tree.circular])
         uniforms = self._random.random((samples, 2 + len(lower)))
-        path, drawn = connect(
+        capacity = 2 * samples + len(roots) + 1
+        first, last = (empty_tree(capacity, lower, upper, circular) for _ in range(2))
+        ends, goals, drawn = connect(
             subsystem.team,
             self._grid,
+            (first, last),
             subsystem.start,
             roots,
             SampledRegion(guide, spread, lower, upper, circular, *way),
@@ -341,7 +351,11 @@ class Sampler:
             COLLISION_STEP,
             uniforms,
         )
-        return path, drawn
+        if not ends:
+            return np.empty((0, len(lower))), drawn
+        return joined(
+            first._replace(nodes=first.nodes[:ends]), last._replace(nodes=last.nodes[:goals])
+        ), drawn
 
     def _goals(self, subsystem: Subsystem) -> FloatArray:
         """Free goal configurations: joints with a goal have that value, the others random values."""

@@ -50,7 +50,6 @@ class Tree(NamedTuple):
     circular: NDArray[np.bool_]
 
 
-@compiled
 def empty_tree(capacity: int, lower: FloatArray, upper: FloatArray, circular: NDArray[np.bool_]) -> Tree:
     """A tree without nodes, with memory for ``capacity`` of them, on a floor between two corners."""
     width, height = upper[0] - lower[0], upper[1] - lower[1]
@@ -307,6 +306,7 @@ def _grow(
 def connect(
     team: TeamArrays,
     grid: ObstacleGrid,
+    trees: tuple[Tree, Tree],
     start: FloatArray,
     roots: FloatArray,
     region: SampledRegion,
@@ -314,12 +314,13 @@ def connect(
     gap: float,
     step: float,
     uniforms: FloatArray,
-) -> tuple[FloatArray, int]:
+) -> tuple[int, int, int]:
     """Grow one tree from the start and one from the goals towards samples and towards each other.
 
     Args:
         team: The team.
         grid: The floor.
+        trees: Two empty trees with memory for 2 S + R + 1 nodes each; receive the nodes.
         start: Free configuration, shape (d,).
         roots: Free goal configurations, shape (R, d).
         region: What is sampled.
@@ -329,18 +330,14 @@ def connect(
         uniforms: Random numbers in [0, 1), one row for each sample, shape (S, 2 + d).
 
     Returns:
-        Path from start to a goal, circular axes unwrapped, shape (m, d), without rows if none was found; and
-        the number of samples drawn.
+        Numbers of nodes of both trees, whose newest ones stand for one configuration, or zeros if the trees
+        have not met; and the number of samples drawn.
     """
-    capacity = 2 * len(uniforms) + len(roots) + 1
-    lower, upper = region.lower, region.upper
-    circular = region.circular
-    trees = (empty_tree(capacity, lower, upper, circular), empty_tree(capacity, lower, upper, circular))
     counts = np.array([1, len(roots)])
     for side in range(2):
         for k in range(counts[side]):
             add(trees[side], k, start if side == 0 else roots[k], -1)
-    room, poses, drawn = np.empty((3, len(lower))), np.empty((len(team.links), 5)), np.empty(len(lower))
+    room, poses, drawn = np.empty((3, len(start))), np.empty((len(team.links), 5)), np.empty(len(start))
     side, fronts = 0, np.array([0, len(region.guide) - 1])
     for row in range(len(uniforms)):
         # The row of the guide to sample around: any, or mostly one near the furthest that the tree reached.
@@ -372,9 +369,31 @@ def connect(
                 team, grid, trees[other], counts[other], z, np.inf, gap, scale, step, room, poses
             )
             if met:
-                return _join(trees[0], trees[1], counts), row + 1
+                return counts[0], counts[1], row + 1
         side = other
-    return np.empty((0, len(start))), len(uniforms)
+    return 0, 0, len(uniforms)
+
+
+def joined(first: Tree, last: Tree) -> FloatArray:
+    """Return the path through the last nodes of both trees, which stand for one configuration.
+
+    Args:
+        first: The nodes of the tree that begins at the start.
+        last: Those of the other one.
+
+    Returns:
+        From the start to a goal, circular axes unwrapped, shape (m, d).
+    """
+    way = [len(first.nodes) - 1]
+    while first.parents[way[-1]] >= 0:
+        way.append(int(first.parents[way[-1]]))
+    path, i = [*first.nodes[way[::-1]]], int(last.parents[len(last.nodes) - 1])
+    while i >= 0:
+        turn = last.nodes[i] - path[-1]
+        unwrapped = path[-1] + turn - 2.0 * pi * np.floor(turn / (2.0 * pi) + 0.5)
+        path.append(np.where(first.circular, unwrapped, last.nodes[i]))
+        i = int(last.parents[i])
+    return np.array(path)
 
 
 @compiled
@@ -428,29 +447,3 @@ def shortened(
             for axis in range(size):
                 path[i + k, axis] = part[k, axis]
     return path
-
-
-@compiled
-def _join(first: Tree, last: Tree, counts: IntArray) -> FloatArray:
-    """Path through the newest nodes of both trees, which stand for one configuration."""
-    path = np.empty((counts[0] + counts[1], first.nodes.shape[1]))
-    size = 0
-    i = counts[0] - 1
-    while i >= 0:
-        size, i = size + 1, first.parents[i]
-    at, i = size, counts[0] - 1
-    while i >= 0:
-        at -= 1
-        for k in range(path.shape[1]):
-            path[at, k] = first.nodes[i, k]
-        i = first.parents[i]
-    i = last.parents[counts[1] - 1]
-    while i >= 0:
-        for k in range(path.shape[1]):
-            path[size, k] = last.nodes[i, k]
-        for k in range(path.shape[1]):
-            if first.circular[k]:
-                turn = last.nodes[i, k] - path[size - 1, k]
-                path[size, k] = path[size - 1, k] + turn - 2.0 * pi * floor(turn / (2.0 * pi) + 0.5)
-        size, i = size + 1, last.parents[i]
-    return path[:size]
