@@ -153,5 +153,5 @@ def closed_after(row: FloatArray) -> float:
 
 
 def jump_at(row: FloatArray, position: float) -> float:
-    """Return what is added to the command at a switch and fades, for an axis at rest, see ``rest_jump``."""
+    """Return what is added to the command at a switch and fades, for an axis at rest, see ``switch_jump``."""
     return -float(track_row(row, 0.0, position, 0.0)[0])

@@ -78,7 +78,7 @@ def follow_tube(
         conditions: How its motion is computed.
         entry: x and v at the entry, the most that they may depart from these, and the largest |x''| and
             command at the entry.
-        jump: What is added to the command and fades, see ``rest_jump``.
+        jump: What is added to the command and fades, see ``switch_jump``.
         tube: Receives the tube, shape (samples, ``COLUMNS``).
     """
     T, n = conditions.period, tube.shape[0]
@@ -315,7 +315,7 @@ class Entry:
         rate_lower: Lowest rate [rad/s or m/s].
         rate_upper: Highest rate [rad/s or m/s].
         acceleration: Largest magnitude of acceleration and command at the entry [rad/s^2 or m/s^2].
-        rest: Position at which the last cell is left at rest, for which ``rest_jump`` is computed [rad
+        rest: Position at which the last cell is left at rest, for which ``switch_jump`` is computed [rad
             or m]; the middle of the positions if not given.
     """
 
