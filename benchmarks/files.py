@@ -1,7 +1,8 @@
 """``python -m benchmarks.files``: the files of the package that a reader opens to follow each answer.
 
-Files are counted whose functions run while one function, the window, is running, with compiling switched off.
-Every question is asked in a process of its own. A whole table takes about an hour.
+Files are counted whose functions run while one function, the window, is running. Of compiled functions no
+call is seen: those count that a function which ran, or another one of them, names. Every question is asked in
+a process of its own. A whole table takes some minutes.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ import subprocess
 import sys
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from types import FrameType
+from types import CodeType, FrameType, ModuleType
 from typing import Any, NamedTuple
 
 from rich.console import Console
@@ -23,6 +24,8 @@ CLOSED = str(Path(__file__).parent / "scenarios" / "three_closed.scenario.yaml")
 DEPLOYED = "deployment: {preset: mobile_base, budget: all}"
 APART = ("apart",)
 """Folders that only robots as processes of their own need."""
+COMPILER = ("jit.py", "compiling.py")
+"""Files that load machine code; they answer no question."""
 
 
 class Question(NamedTuple):
@@ -65,14 +68,11 @@ def main() -> None:
 
 
 def _counted(name: str, folder: Path) -> list[str]:
-    """Ask in a process of its own, without compiling; what is needed before is computed with it."""
+    """Ask in a process of its own."""
     module = [sys.executable, "-m", "benchmarks.files"]
     given = folder / f"{name}.given"
-    environment = {**os.environ, "NUMBA_DISABLE_JIT": "1"}
     subprocess.run([*module, "--prepare", name, given], check=True)
-    answer = subprocess.run(
-        [*module, "--ask", name, given], env=environment, check=True, capture_output=True, text=True
-    )
+    answer = subprocess.run([*module, "--ask", name, given], check=True, stdout=subprocess.PIPE, text=True)
     return answer.stdout.split()
 
 
@@ -96,7 +96,7 @@ def _ask(name: str, given: Path) -> None:
     scenario = coop_drake.load_scenario(deployed if name == "budget" else QUESTIONS[name].scenario)
     plan = pickle.loads(given.read_bytes())
     maps = () if plan is None else coop_drake.build_maps(plan)
-    files: set[str] = set()
+    ran: dict[CodeType, dict[str, Any]] = {}
     depth = 0
 
     def count(frame: FrameType, event: str, _: Any) -> None:
@@ -107,7 +107,7 @@ def _ask(name: str, given: Path) -> None:
         if event == "call":
             depth += code.co_name == window
             if depth and code.co_name != "<module>":
-                files.add(code.co_filename[len(PACKAGE) :])
+                ran[code] = frame.f_globals
         elif event == "return" and code.co_name == window:
             depth -= 1
             if depth == 0 and name in ("channel", "proof", "budget"):
@@ -123,7 +123,24 @@ def _ask(name: str, given: Path) -> None:
         pass
     finally:
         sys.setprofile(None)
-    sys.stdout.write("\n".join(files))
+    files = {code.co_filename[len(PACKAGE) :] for code in _with_compiled(ran)}
+    sys.stdout.write("\n".join(files.difference(COMPILER)))
+
+
+def _with_compiled(ran: dict[CodeType, dict[str, Any]]) -> set[CodeType]:
+    """Add the compiled functions that functions name, and those that these name, to functions and globals."""
+    found, new = set[CodeType](), list(ran.items())
+    while new:
+        code, known = new.pop()
+        if code in found:
+            continue
+        found.add(code)
+        named = [known[name] for name in code.co_names if name in known]
+        modules = [vars(value) for value in named if isinstance(value, ModuleType)]
+        named += [names[name] for names in modules for name in code.co_names if name in names]
+        kernels = [value.py_func for value in named if hasattr(value, "py_func")]
+        new += [(kernel.__code__, kernel.__globals__) for kernel in kernels]
+    return found
 
 
 class _AnsweredError(Exception):
