@@ -13,6 +13,7 @@ import numpy as np
 
 from coop_drake.laws.robot_dynamics import MOTION_COLUMNS
 from coop_drake.laws.team_dynamics import StickingRoom, TeamWork, sticking_room, team_work
+from coop_drake.systems.departures import WorldDepartures
 from coop_drake.systems.kernels import NOMINAL_SIZE
 from coop_drake.tree.pose import FloatArray, IntArray
 from coop_drake.tree.team_arrays import TeamArrays
@@ -143,13 +144,9 @@ class LoopDepartures(NamedTuple):
         odometry: Factors of the measured rates of bases, shape (N,) [-].
         shifts: How much earlier robots measure than they take it for, in periods, shape (N,) [-].
         limits: Largest efforts, of every robot those of ``limit_efforts``, shape (2 N + n,) [N, N m].
-        floor: Coulomb friction [N], viscous friction [N s/m], acceleration of gravity along x [m/s^2], (3,).
-        friction: Coulomb [N m or N] and viscous friction [N m s or N s/m] of every joint, shape (2,).
-        pushes: Place in ``LoopPlant.bases``, force [N], torque [N m], begin and end [s], shape (., 6).
         hearing: Errors of the clocks [s], and how late switches are heard [periods], shape (2, N).
         silences: Begin and end [s], and 0 for motors that work, 1 for held ones, 2 for limp ones, (3, N).
-        blocked: Begin and end of the time in which wheels are blocked, shape (2, N) [s].
-        slips: Begin and end of the time in which wheels slip [s], and the share that is lost [-], (3, N).
+        world: What the world does to the team.
     """
 
     times: FloatArray
@@ -161,13 +158,9 @@ class LoopDepartures(NamedTuple):
     odometry: FloatArray
     shifts: FloatArray
     limits: FloatArray
-    floor: FloatArray
-    friction: FloatArray
-    pushes: FloatArray
     hearing: FloatArray
     silences: FloatArray
-    blocked: FloatArray
-    slips: FloatArray
+    world: WorldDepartures
 
 
 class LoopMemory(NamedTuple):
@@ -289,7 +282,7 @@ class MotionRoom(NamedTuple):
         motion: Motion of the longest chain, see ``chain_motion.motion_room``.
         work: Of the equations of motion.
         sticking: Of blocked wheels and of the friction of joints.
-        blocked: 1 for bases with blocked wheels, else 0, shape (N,).
+        velocities: Of all bases in W, shape (N, 2) [m/s].
     """
 
     acting: FloatArray
@@ -301,7 +294,7 @@ class MotionRoom(NamedTuple):
     motion: FloatArray
     work: TeamWork
     sticking: StickingRoom
-    blocked: FloatArray
+    velocities: FloatArray
 
 
 def plant_room(team: LoopTeam, plant: LoopPlant) -> MotionRoom:
@@ -311,7 +304,7 @@ def plant_room(team: LoopTeam, plant: LoopPlant) -> MotionRoom:
     return MotionRoom(
         np.empty(3 * robots + n - 3), np.empty((3, 2 * n)), np.empty(n), np.empty((robots + 1, 3)),
         np.zeros(n), np.empty(2 * n), _longest_motion(team), team_work(plant.tree),
-        sticking_room(links, robots), np.zeros(robots),
+        sticking_room(links, robots), np.empty((robots, 2)),
     )  # fmt: skip
 
 

@@ -20,12 +20,10 @@ from coop_drake.laws.actuators import lag_behind, limit_efforts
 from coop_drake.laws.measurements import carry_reports, uniform_pair
 from coop_drake.laws.nominal import carry_axes
 from coop_drake.laws.robot_dynamics import read_robot
-from coop_drake.laws.team_dynamics import base_friction, stick, team_accelerations
+from coop_drake.laws.team_dynamics import stick
+from coop_drake.systems.departures import act_on_wrenches
 from coop_drake.systems.kernels import step_nominal
 from coop_drake.tree.pose import FloatArray
-
-BEGIN, END = 4, 5
-"""Columns of the times of a push."""
 
 EARLY = 1e-6
 """Share of a period by which an interval that begins at a sample may seem to begin later [-], by rounding."""
@@ -129,19 +127,14 @@ def advance(
 
     Efforts follow what is held as exponentials, exactly. A step of 5 ms errs by 1e-8 of the distances moved.
     """
-    period, n = departures.times[0], memory.state.size // 2
-    instant, early = sample * period, EARLY * period
-    sticks = departures.friction[0] > 0.0 or departures.friction[1] > 0.0
+    period, n, world = departures.times[0], memory.state.size // 2, departures.world
+    instant, early, floor = sample * period, EARLY * period, world.floor
     state, start, change, slopes = room.states[0], room.states[1], room.states[2], room.slopes
-    robots, wrenches, efforts, floor = team.yaws.size, room.wrenches, room.efforts, departures.floor
+    robots, wrenches, efforts = team.yaws.size, room.wrenches, room.efforts
     for i in range(room.acting.size):
         room.acting[i] = memory.efforts[1, i]
     for i in range(2 * n):
         state[i], start[i], change[i] = memory.state[i], memory.state[i], 0.0
-    for k in range(room.blocked.size):
-        begin, end = departures.blocked[0, k], departures.blocked[1, k]
-        room.blocked[k] = 1.0 if begin - early <= instant < end - early else 0.0
-        sticks = sticks or room.blocked[k] > 0.0
     for stage in range(4):
         ahead = 0.0 if stage == 0 else period if stage == 3 else 0.5 * period
         if stage != 2:  # Efforts are those of stage 1.
@@ -149,11 +142,9 @@ def advance(
         for i in range(3):
             wrenches[robots, i] = 0.0
         for k in range(robots):
-            first, own, left = team.first[2, k], 3 * k + team.first[2, k], 1.0
-            if departures.slips[0, k] - early <= instant < departures.slips[1, k] - early:
-                left -= departures.slips[2, k]
+            first, own = team.first[2, k], 3 * k + team.first[2, k]
             for i in range(3):
-                wrenches[k, i] = left * memory.efforts[1, own + i]
+                wrenches[k, i] = memory.efforts[1, own + i]
             for i in range(team.first[2, k + 1] - first):
                 limit, effort = plant.strongest[first + i], memory.efforts[1, own + 3 + i]
                 efforts[team.places[1, 3 + first + i] - n] = min(max(effort, -limit), limit)
@@ -162,23 +153,12 @@ def advance(
                 base = team.base_chains[team.first[1, k] : team.first[1, k + 1]]
                 read_robot(base, team.yaws[k], joints, room.motion, state, room.robot)
                 rates = 3 + team.first[2, k + 1] - first
-                fx, fy = base_friction(room.robot[rates], room.robot[rates + 1], floor[0], floor[1])
-                wrenches[k, 0] += fx
-                wrenches[k, 1] += fy
-        for push in range(departures.pushes.shape[0]):
-            row = departures.pushes[push]
-            if row[BEGIN] <= instant + ahead < row[END]:
-                for i in range(3):
-                    wrenches[int(row[0]), i] += row[1 + i]
-        if sticks:
-            stick(
-                plant.tree, plant.bases, plant.places, room.blocked, departures.friction, efforts, floor[2],
-                state, room.work, room.sticking, slopes, wrenches,
-            )  # fmt: skip
-        else:
-            team_accelerations(
-                plant.tree, plant.bases, plant.places, wrenches, efforts, floor[2], state, room.work, slopes,
-            )  # fmt: skip
+                room.velocities[k, 0], room.velocities[k, 1] = room.robot[rates], room.robot[rates + 1]
+        act_on_wrenches(world, instant + early, instant + ahead, room.velocities, wrenches)
+        stick(
+            plant.tree, plant.bases, plant.places, world.blocked, instant + early, world.friction, efforts,
+            floor[2], state, room.work, room.sticking, slopes, wrenches,
+        )  # fmt: skip
         weight = period / 6.0 if stage in (0, 3) else period / 3.0
         further = 0.0 if stage == 3 else period if stage == 2 else 0.5 * period
         for i in range(n):

@@ -98,7 +98,7 @@ def departures_of(transport: CompiledTransport, deployment: Deployment) -> array
         limits=np.concatenate([effort_limits(deployment, n) for n in joints]),
         hearing=np.array(hearing, dtype=float),
         silences=_silences(deployment, names),
-        **world_departures(deployment, names)._asdict(),
+        world=world_departures(deployment, names),
     )  # fmt: skip
 
 

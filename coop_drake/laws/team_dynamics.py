@@ -252,30 +252,6 @@ def _add_body(row: FloatArray, centre: FloatArray, mass: float, inertia: float) 
     row[MASS] = both
 
 
-# Friction of a base on the floor.
-
-CREEP_SPEED = 0.01
-"""Speed below which Coulomb friction falls off with the speed [m/s]: small beside the speed of a transport,
-and large enough for steps of a millisecond, with a friction of 100 N on a base of 6 kg."""
-
-
-@compiled
-def base_friction(vx: float, vy: float, coulomb: float, viscous: float) -> tuple[float, float]:
-    """Return the force of the floor on a base, -(f_c / sqrt(|v|^2 + v_c^2) + f_v) v [N].
-
-    This is Coulomb friction made continuous at rest, where the force is less than f_c and a push makes the
-    base creep, plus viscous friction.
-
-    Args:
-        vx: First coordinate of the base's velocity in W [m/s].
-        vy: Second coordinate [m/s].
-        coulomb: f_c, the friction force at any speed well above v_c, ``CREEP_SPEED`` [N].
-        viscous: f_v, friction force for each unit of speed [N s/m].
-    """
-    factor = -(coulomb / np.sqrt(vx * vx + vy * vy + CREEP_SPEED * CREEP_SPEED) + viscous)
-    return factor * vx, factor * vy
-
-
 # What sticks: wheels that are blocked, and joints with dry friction.
 #
 # Each is a force that lets a rate come to rest, as far as it is strong enough. Blocked wheels hold their
@@ -356,9 +332,9 @@ def sticking_room(links: int, robots: int) -> StickingRoom:
 
 @compiled(borrows=True)
 def stick(
-    tree: FloatArray, bases: IntArray, places: FloatArray, blocked: FloatArray, friction: FloatArray,
-    efforts: FloatArray, gravity: float, state: FloatArray, work: TeamWork, room: StickingRoom,
-    accelerations: FloatArray, wrenches: FloatArray,
+    tree: FloatArray, bases: IntArray, places: FloatArray, blocked: FloatArray, instant: float,
+    friction: FloatArray, efforts: FloatArray, gravity: float, state: FloatArray, work: TeamWork,
+    room: StickingRoom, accelerations: FloatArray, wrenches: FloatArray,
 ) -> None:  # fmt: skip
     """Add the floor's wrenches on all blocked bases and the friction of all joints, and write accelerations.
 
@@ -367,7 +343,8 @@ def stick(
             belong to the bases.
         bases: Rows of the links on which wrenches act.
         places: Where they act.
-        blocked: 1 for every base with blocked wheels, else 0, shape (N,).
+        blocked: When the wheels of every base are blocked from and until, shape (2, N) [s].
+        instant: Time at which it is decided whether they are [s].
         friction: f_c of every joint [N m or N], and what it has besides for each unit of its rate [N m s or
             N s/m], shape (2,).
         efforts: This and the next three arguments are those of ``team_accelerations``, too; receives the
@@ -380,14 +357,20 @@ def stick(
         wrenches: Wrenches on all bases, and where there is a further row, on the object; receives the sum.
     """
     wanted, found, chosen = room.wanted, room.found, room.chosen
-    m, size, first = wanted.size, tree.shape[0] + 2, 3 * blocked.size
+    m, size, first, sticks = wanted.size, tree.shape[0] + 2, 3 * blocked.shape[1], False
+    for i in range(m):
+        room.limits[i] = friction[0]
+        if i < first:
+            room.limits[i] = np.inf if blocked[0, i // 3] <= instant < blocked[1, i // 3] else 0.0
+        sticks = sticks or room.limits[i] > 0.0
     for i in range(1, tree.shape[0]):
         rate = int(tree[i, RATE])
         efforts[rate - size] -= friction[1] * state[rate]
     team_accelerations(tree, bases, places, wrenches, efforts, gravity, state, work, accelerations)
+    if not sticks:
+        return
     _motion_of(tree, bases, places, state, work, accelerations, room.joints, room.rates, room.free)
     for i in range(m):
-        room.limits[i] = friction[0] if i >= first else np.inf if blocked[i // 3] == 1.0 else 0.0
         wanted[i] = -room.rates[i] / (STICKING_TIME if i >= first else BRAKING_TIME) - room.free[i]
     for j in range(m):
         if room.limits[j] == 0.0:

@@ -9,7 +9,7 @@ from coop_drake.systems.block import (
     Block,
     build_selector,
 )
-from coop_drake.systems.departures import FloorFriction, Sticking, WheelSlips
+from coop_drake.systems.departures import FloorFriction, Pushes, Sticking, WheelSlips
 from coop_drake.systems.governor import GovernedCell, NominalGovernor, NominalMotion, ReferenceGovernor
 from coop_drake.systems.holds import FunnelClock, HoldMonitor, HoldReceiver, HoldSupervisor
 from coop_drake.systems.measurements import (
@@ -65,6 +65,7 @@ __all__ = [
     "NominalGovernor",
     "NominalMotion",
     "ObjectEstimator",
+    "Pushes",
     "ReadyMonitor",
     "ReferenceGovernor",
     "RobotEffort",

@@ -1,7 +1,7 @@
 """What the world does to a team beside its actuators: wheels that slip or block, friction, slopes and pushes.
 
-Each departure has its numbers for a run (``WorldDepartures``), its law and its block here. A new one is a key
-in ``scenario/deployment.py``, and the rest in this file.
+Each departure has its numbers for a run (``WorldDepartures``), its law, which both loops call, and its block
+here. A new one is a key in ``scenario/deployment.py``, which is read without Drake, and the rest in here.
 """
 
 from __future__ import annotations
@@ -12,16 +12,23 @@ from typing import NamedTuple
 
 import numpy as np
 from pydrake.systems.framework import DiagramBuilder, OutputPort
-from pydrake.systems.primitives import Adder, Demultiplexer, MatrixGain, TrajectorySource
-from pydrake.trajectories import PiecewisePolynomial
+from pydrake.systems.primitives import Adder, Demultiplexer
 
 from coop_drake.errors import ScenarioError
-from coop_drake.laws.team_dynamics import base_friction, stick, sticking_room, team_work
+from coop_drake.jit import compiled
+from coop_drake.laws.team_dynamics import stick, sticking_room, team_work
 from coop_drake.plant import TeamPlant, read_component_tree, read_team_tree
 from coop_drake.plant.planar_model import TeamTree
 from coop_drake.scenario import BlockedWheels, Deployment, Floor, JointFriction, WheelSlip
 from coop_drake.systems.block import Law
 from coop_drake.tree.pose import FloatArray, IntArray
+
+CREEP_SPEED = 0.01
+"""v_c, below which Coulomb friction falls off with the speed [m/s]: small beside the speed of a transport,
+and large enough for steps of a millisecond, with a friction of 100 N on a base of 6 kg."""
+
+_STILL = np.empty((0, 2))
+"""Velocities of bases, where no friction of the floor reads them."""
 
 _GRAVITY = 9.80665
 """Standard acceleration of gravity [m/s^2]."""
@@ -72,6 +79,46 @@ def _times(fault: WheelSlip | BlockedWheels | None) -> tuple[float, float]:
     return fault.begin, inf if fault.duration is None else fault.begin + fault.duration
 
 
+def without_departures(robots: int) -> WorldDepartures:
+    """Return a world of N robots in which nothing departs."""
+    never = np.full((3, robots), inf)
+    return WorldDepartures(never, np.zeros(3), np.empty((0, 6)), never[:2], np.zeros(2))
+
+
+@compiled(borrows=True)
+def act_on_wrenches(
+    world: WorldDepartures, instant: float, time: float, velocities: FloatArray, wrenches: FloatArray
+) -> None:
+    """Turn the wrenches that actuators give into those that bases and object take up.
+
+    Slipping wheels take their share off; then friction of the floor and pushes are added. The floor's force
+    on a base is -(f_c / sqrt(|v|^2 + v_c^2) + f_v) v: Coulomb friction made continuous at rest, where the
+    force is less than f_c and a push makes the base creep, plus viscous friction.
+
+    Args:
+        world: The departures; of its floor only the friction acts here.
+        instant: Time at which it is decided whether wheels slip, in the compiled loop that of a sample [s].
+        time: Now [s].
+        velocities: Of all bases in W, shape (N, 2); read where the floor has friction [m/s].
+        wrenches: Those of the bases, and where there are pushes, of the object in row N; they are changed,
+            shape (N, 3) or (N + 1, 3) [N, N m].
+    """
+    slips, floor, pushes = world.slips, world.floor, world.pushes
+    for k in range(slips.shape[1]):
+        if slips[0, k] <= instant < slips[1, k]:
+            for i in range(3):
+                wrenches[k, i] *= 1.0 - slips[2, k]
+        if floor[0] > 0.0 or floor[1] > 0.0:
+            vx, vy = velocities[k, 0], velocities[k, 1]
+            factor = -(floor[0] / np.sqrt(vx * vx + vy * vy + CREEP_SPEED * CREEP_SPEED) + floor[1])
+            wrenches[k, 0] += factor * vx
+            wrenches[k, 1] += factor * vy
+    for push in range(pushes.shape[0]):
+        if pushes[push, 4] <= time < pushes[push, 5]:
+            for i in range(3):
+                wrenches[int(pushes[push, 0]), i] += pushes[push, 1 + i]
+
+
 def tilt_floor(team: TeamPlant, floor: Floor) -> None:
     """Let gravity pull all bodies of a plant down the slope of the floor, along x of W."""
     if floor.slope:
@@ -99,18 +146,17 @@ class WheelSlips(Law):
     """
 
     def __init__(self, slips: FloatArray) -> None:
-        begin, end, share = slips
-        size = 3 * slips.shape[1]
+        size, world = 3 * slips.shape[1], without_departures(slips.shape[1])._replace(slips=slips)
 
         def write(time: float, driven: FloatArray, passed: FloatArray) -> None:
-            left = np.where((begin <= time) & (time < end), 1.0 - share, 1.0)
-            passed[:] = np.repeat(left, 3) * driven
+            passed[:] = driven
+            act_on_wrenches(world, time, time, _STILL, passed.reshape(-1, 3))
 
         super().__init__({"driven": size}, {"passed": (size, write)}, timed=True)
 
 
 class FloorFriction(Law):
-    """Gives the friction force on every base, see ``base_friction``; part of the world, not of a robot.
+    """Gives the friction force on every base, see ``act_on_wrenches``; part of the world, not of a robot.
 
     ======= ===================== ========= ===================================================== =====
     input   ``robot_<k>_state``   2 (3+n_k) z_k and its rate, z_k = (x, y, yaw of Bk, q_k)         W
@@ -131,17 +177,44 @@ class FloorFriction(Law):
     def __init__(self, joints: Sequence[int], coulomb: float, viscous: float) -> None:
         if not (coulomb >= 0.0 and viscous >= 0.0):
             raise ValueError(f"FloorFriction needs no negative friction, not {coulomb} and {viscous}")
+        world = without_departures(len(joints))._replace(floor=np.array([coulomb, viscous, 0.0]))
 
         def write(*given: FloatArray) -> None:
             *states, wrenches = given
-            for k, (state, n) in enumerate(zip(states, joints, strict=True)):
-                force = base_friction(state[3 + n], state[4 + n], coulomb, viscous)
-                wrenches[3 * k : 3 * k + 3] = *force, 0.0
+            rates = np.array([state[3 + n : 5 + n] for state, n in zip(states, joints, strict=True)])
+            wrenches[:] = 0.0
+            act_on_wrenches(world, 0.0, 0.0, rates, wrenches.reshape(-1, 3))
 
         super().__init__(
             {f"robot_{k}_state": 2 * (3 + n) for k, n in enumerate(joints)},
             {"friction_wrenches": (3 * len(joints), write)},
         )
+
+
+class Pushes(Law):
+    """Adds pushes on bases and object to the wrenches on all bases; part of the world, not of a robot.
+
+    ======= ========== ======= ================================================ =====
+    input   ``asked``  3 N     wrenches on all bases [N, N m]                   W
+    output  ``pushed`` 3 N + 3 the same with the pushes, then that on the object W
+    ======= ========== ======= ================================================ =====
+
+    No state.
+
+    Args:
+        robots: Number of robots N.
+        pushes: Of every push the robot whose base is pushed, N for the object, its force [N] and torque
+            [N m], begin and end [s], shape (., 6).
+    """
+
+    def __init__(self, robots: int, pushes: FloatArray) -> None:
+        size, world = 3 * robots, without_departures(robots)._replace(pushes=pushes)
+
+        def write(time: float, asked: FloatArray, pushed: FloatArray) -> None:
+            pushed[:size], pushed[size:] = asked, 0.0
+            act_on_wrenches(world, time, time, _STILL, pushed.reshape(-1, 3))
+
+        super().__init__({"asked": size}, {"pushed": (size + 3, write)}, timed=True)
 
 
 class Sticking(Law):
@@ -178,16 +251,13 @@ class Sticking(Law):
     def _write_forces(
         self, time: float, state: FloatArray, torques: FloatArray, asked: FloatArray, forces: FloatArray
     ) -> None:
-        world, forces[: asked.size], forces[asked.size :] = self._world, asked, 0.0
-        blocked = ((world.blocked[0] <= time) & (time < world.blocked[1])).astype(float)
-        if not (blocked.any() or world.friction.any()):
-            return
-        given = np.zeros(forces.size - asked.size)
+        world, given = self._world, np.zeros(forces.size - asked.size)
         given[self._rates] = np.clip(torques, -self._strongest, self._strongest)
         efforts, wrenches = given.copy(), asked.reshape(-1, 3).copy()
         stick(
             *self._known,
-            blocked,
+            world.blocked,
+            time,
             world.friction,
             efforts,
             float(world.floor[2]),
@@ -231,13 +301,14 @@ def add_departures(
         friction = builder.AddNamedSystem("floor_friction", FloorFriction(joints, *world.floor[:2].tolist()))
         for k, state in enumerate(states):
             builder.Connect(state, friction.get_input_port(k))
-        wrenches = _sum(builder, "wrenches_less_friction", wrenches, friction.get_output_port())
+        less = builder.AddNamedSystem("wrenches_less_friction", Adder(2, wrenches.size()))
+        builder.Connect(wrenches, less.get_input_port(0))
+        builder.Connect(friction.get_output_port(), less.get_input_port(1))
+        wrenches = less.get_output_port()
     if len(world.pushes):
-        size = wrenches.size()
-        on_object = builder.AddNamedSystem("wrenches_with_object", MatrixGain(np.eye(size + 3, size)))
-        builder.Connect(wrenches, on_object.get_input_port())
-        pushes = builder.AddNamedSystem("pushes", TrajectorySource(_pushes(world.pushes, size + 3)))
-        wrenches = _sum(builder, "pushed", on_object.get_output_port(), pushes.get_output_port())
+        pushes = builder.AddNamedSystem("pushes", Pushes(len(team.robots), world.pushes))
+        builder.Connect(wrenches, pushes.get_input_port())
+        wrenches = pushes.get_output_port()
     if np.isfinite(world.blocked[0]).any() or world.friction.any():
         wrenches = _stick(builder, team, world, wrenches, torques)
     return wrenches
@@ -266,21 +337,3 @@ def _stick(
     builder.Connect(block.get_output_port(), parts.get_input_port())
     builder.Connect(parts.get_output_port(1), team.plant.get_applied_generalized_force_input_port())
     return parts.get_output_port(0)
-
-
-def _sum(builder: DiagramBuilder, name: str, first: OutputPort, second: OutputPort) -> OutputPort:
-    adder = builder.AddNamedSystem(name, Adder(2, first.size()))
-    builder.Connect(first, adder.get_input_port(0))
-    builder.Connect(second, adder.get_input_port(1))
-    return adder.get_output_port()
-
-
-def _pushes(pushes: FloatArray, size: int) -> PiecewisePolynomial:
-    """Return the sum of all pushes on each body as a function of time, wrenches of so many numbers."""
-    times = sorted({0.0, *pushes[:, 4:].ravel().tolist()})
-    # The last sample is zero, and its value holds for ever.
-    values = np.zeros((size, len(times)))
-    for body, *wrench, begin, end in pushes.tolist():
-        at, lasting = 3 * int(body), [begin <= time < end for time in times]
-        values[at : at + 3, lasting] += np.array([wrench]).T
-    return PiecewisePolynomial.ZeroOrderHold([*times, times[-1] + 1.0], np.c_[values, values[:, -1]])

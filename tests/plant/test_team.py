@@ -356,10 +356,10 @@ def test_what_sticks_in_drake_sticks_whatever_else_acts(tmp_path, blocked, frict
     tree = read_team_tree(team, read_component_tree(team))
     context = plant.GetMyMutableContextFromRoot(diagram.CreateDefaultContext())
     size, work, room = plant.num_velocities(), team_work(tree.tree), sticking_room(len(tree.tree), len(ARMS))
-    flags, joints = np.zeros(len(ARMS)), team.velocity_index[3:]
+    times, joints = np.full((2, len(ARMS)), np.inf), team.velocity_index[3:]
     loose = [len(blocked) < 2 or k not in blocked for k, arm in enumerate(ARMS) for _ in arm]
     kinds = set()
-    flags[blocked] = 1.0
+    times[:, blocked] = [[0.0], [1.0]]
     for draw in range(10):
         state, wrenches = generator.normal(size=2 * size), 30.0 * generator.normal(size=(len(ARMS) + 1, 3))
         state[team.position_index[3:]] *= 0.1
@@ -368,7 +368,7 @@ def test_what_sticks_in_drake_sticks_whatever_else_acts(tmp_path, blocked, frict
         torques, efforts = 3.0 * generator.normal(size=len(team.joints)), np.zeros(size)
         efforts[joints] = torques
         found, asked = np.empty(size), wrenches.copy()
-        forces = tree.bases, tree.places, flags, np.array(friction), efforts, 0.0
+        forces = tree.bases, tree.places, times, 0.5, np.array(friction), efforts, 0.0
         stick(tree.tree, *forces, state, work, room, found, wrenches)
         free = [k for k in range(len(ARMS) + 1) if k not in blocked]
         np.testing.assert_array_equal(wrenches[free], asked[free])

@@ -22,6 +22,7 @@ from coop_drake.scenario import (
     Measurements,
     Messages,
     PlantSettings,
+    Push,
     RobotDepartures,
     Silence,
     WheelSlip,
@@ -48,6 +49,7 @@ EVERYTHING = Deployment(
     robots={"*": RobotDepartures(silence=Silence(1.0), blocked=BlockedWheels(1.0), slip=WheelSlip(1.0, 0.5))},
     floor=Floor(coulomb_friction=1.0),
     joint_friction=JointFriction(coulomb=0.1),
+    pushes=(Push("object", (1.0, 0.0), time=1.0, duration=0.5),),
     actuators=ActuatorLimits(lag=0.01),
     clock_error=0.001,
 )

@@ -10,7 +10,6 @@ from pydrake.systems.primitives import FirstOrderLowPassFilter, ZeroOrderHold
 
 from coop_drake import systems
 from coop_drake.laws import acceleration_at, wrench_share
-from coop_drake.laws.team_dynamics import CREEP_SPEED, base_friction
 from coop_drake.plant import (
     base_poses,
     build_robot_plant,
@@ -18,6 +17,7 @@ from coop_drake.plant import (
     build_team_plant,
     set_configuration,
 )
+from coop_drake.systems.departures import CREEP_SPEED, act_on_wrenches, without_departures
 from tests.support.robot_matrices import turned
 from tests.support.small_scenario import small_scenario
 from tests.support.system_checks import evaluate, port_sizes
@@ -178,9 +178,20 @@ def test_a_force_is_limited_by_its_length_and_torques_and_joints_one_by_one(aske
 SPEEDS = st.floats(-3.0, 3.0)
 
 
+def base_friction(vx, vy, coulomb, viscous):
+    """What the floor does to one base, and no torque."""
+    world, wrenches = (
+        without_departures(1)._replace(floor=np.array([coulomb, viscous, 0.0])),
+        np.zeros((1, 3)),
+    )
+    act_on_wrenches(world, 0.0, 0.0, np.array([[vx, vy]]), wrenches)
+    assert wrenches[0, 2] == 0.0
+    return wrenches[0, :2]
+
+
 @given(SPEEDS, SPEEDS, st.floats(0.0, 100.0), st.floats(0.0, 100.0))
 def test_friction_opposes_motion_and_is_no_stronger_than_stated(vx, vy, coulomb, viscous):
-    force, speed = np.array(base_friction(vx, vy, coulomb, viscous)), np.hypot(vx, vy)
+    force, speed = base_friction(vx, vy, coulomb, viscous), np.hypot(vx, vy)
     assert force @ [vx, vy] <= 0.0
     assert force[0] * vy == pytest.approx(force[1] * vx, abs=1e-9)
     assert np.hypot(*force) <= (coulomb + viscous * speed) * (1.0 + 1e-12)
@@ -194,6 +205,19 @@ def test_wheels_that_slip_lose_their_share_for_their_time():
     for time, left in ((0.9, 1.0), (1.0, 0.7), (1.9, 0.7), (2.0, 1.0)):
         passed = evaluate(block, {"driven": driven}, "passed", time)
         np.testing.assert_allclose(passed, driven * [left, left, left, 1.0, 1.0, 1.0], rtol=1e-15)
+
+
+def test_pushes_add_up_on_what_they_push_while_they_last():
+    block = systems.Pushes(1, np.array([[0, 5.0, -1.0, 0.2, 1.0, 2.0], [1, 0.0, 3.0, 0.4, 1.5, 3.0],
+                                        [1, 1.0, 1.0, 0.0, 1.5, 2.0]]))  # fmt: skip
+    assert port_sizes(block) == ({"asked": 3}, {"pushed": 6})
+    for time, own, on_object in (
+        (0.9, [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]), (1.0, [5.0, -1.0, 0.2], [0.0, 0.0, 0.0]),
+        (1.5, [5.0, -1.0, 0.2], [1.0, 4.0, 0.4]), (2.0, [0.0, 0.0, 0.0], [0.0, 3.0, 0.4]),
+        (3.0, [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]),
+    ):  # fmt: skip
+        pushed = evaluate(block, {"asked": [7.0, 8.0, 9.0]}, "pushed", time)
+        np.testing.assert_allclose(pushed, [*np.add([7.0, 8.0, 9.0], own), *on_object], rtol=1e-15)
 
 
 def test_every_base_has_its_own():
