@@ -38,48 +38,58 @@ def disagreement_coupling(
     owners, links = (np.array([int(body[i]) for body in moved]) for i in (5, 0))
     places = np.array([frames[int(body[0])].apply(np.array(body[2:4])) for body in moved])
     masses = np.array([body[1] for body in moved])
-    squares = np.zeros((len(joints), 1 + joints.shape[1]))
-    configurations = np.ascontiguousarray(joints)
-    _add_squares(chain, (owners, links), places, masses, configurations, team_work(chain), squares)
-    coupling: FloatArray = np.sqrt(squares)
+    wrenches = np.zeros((int(owners[-1]) + 1, 2, len(masses), 3))
+    for k, own in enumerate(wrenches):
+        own[0, :, 0] = own[1, :, 1] = np.where(owners == k, masses, 0.0)
+    states = _at_rest(joints)
+    pushes = wrenches.reshape(-1, *wrenches.shape[2:])
+    found = _accelerations(chain, links, places, pushes, states, team_work(chain))
+    coupling: FloatArray = np.sqrt((found[:, :, 2:] ** 2).sum(axis=1))
     return coupling
 
 
+def _at_rest(joints: FloatArray) -> FloatArray:
+    """Return states of a team that ``team_accelerations`` takes, at configurations of its joints.
+
+    Args:
+        joints: The configurations, shape (configurations, n).
+
+    Returns:
+        Shape (configurations, 2 (3 + n)).
+    """
+    states = np.zeros((len(joints), 2 * (3 + joints.shape[1])))
+    states[:, 3 : 3 + joints.shape[1]] = joints
+    return states
+
+
 @compiled
-def _add_squares(
+def _accelerations(
     chain: FloatArray,
-    of_bodies: tuple[IntArray, IntArray],
+    links: IntArray,
     places: FloatArray,
-    masses: FloatArray,
-    joints: FloatArray,
+    wrenches: FloatArray,
+    states: FloatArray,
     work: TeamWork,
-    squares: FloatArray,
-) -> None:
-    """Add the squares of W_k along x and y for all robots k.
+) -> FloatArray:
+    """Return the accelerations of a team without efforts for all states under all wrenches.
 
     Args:
         chain: The team, of the form that ``team_accelerations`` takes.
-        of_bodies: The robot, in ascending order, and the link of every body, shape (bodies,) each.
-        places: Their centres of mass, in the plane of the object's frame with all joints at zero, shape
-            (bodies, 2) [m].
-        masses: Their masses, shape (bodies,) [kg].
-        joints: Configurations, shape (configurations, n) [rad or m].
+        links: The links that are pushed, shape (m,).
+        places: Where, in the plane of the object's frame with all joints at zero, shape (m, 2) [m].
+        wrenches: Shape (w, m, 3) [N, N m].
+        states: Shape (s, 2 (3 + n)).
         work: Room.
-        squares: Receives the sums, shape (configurations, 1 + n) [rad^2/m^2 or -].
+
+    Returns:
+        Shape (s, w, 3 + n).
     """
-    owners, links = of_bodies
-    n = joints.shape[1] + 3
-    state, efforts = np.zeros(2 * n), np.zeros(n)
-    found, wrenches = np.empty(n), np.zeros((masses.size, 3))
-    for c in range(joints.shape[0]):
-        state[3:n] = joints[c]
-        for robot in range(owners[-1] + 1):
-            for direction in range(2):
-                for b in range(masses.size):
-                    wrenches[b] = 0.0
-                    wrenches[b, direction] = masses[b] if owners[b] == robot else 0.0
-                team_accelerations(chain, links, places, wrenches, efforts, 0.0, state, work, found)
-                squares[c] += found[2:] ** 2
+    n = states.shape[1] // 2
+    efforts, found = np.zeros(n), np.empty((states.shape[0], wrenches.shape[0], n))
+    for s in range(states.shape[0]):
+        for w in range(wrenches.shape[0]):
+            team_accelerations(chain, links, places, wrenches[w], efforts, 0.0, states[s], work, found[s, w])
+    return found
 
 
 # Centripetal and Coriolis terms: how much the rates of a team's axes accelerate them by themselves.
@@ -103,30 +113,16 @@ def rate_terms(
         Sizes of the coefficients, [..., i, j, k], zero for k > j, shape (configurations, axes, axes, axes).
     """
     chain, axes = team_chain(tree, bodies, rotors), 1 + joints.shape[1]
-    coefficients = np.zeros((len(joints), axes, axes, axes))
-    _write_coefficients(chain, np.ascontiguousarray(joints), team_work(chain), coefficients)
+    nothing, nowhere = np.empty(0, dtype=np.int64), np.empty((0, 2))
+    pairs = np.array([(j, k) for j in range(axes) for k in range(j + 1)])
+    states = np.repeat(_at_rest(joints)[:, None], len(pairs), axis=1)
+    for state, pair in zip(states.swapaxes(0, 1), pairs, strict=True):
+        state[:, 4 + axes + pair] = 1.0
+    rows = states.reshape(-1, states.shape[2])
+    found = _accelerations(chain, nothing, nowhere, np.empty((1, 0, 3)), rows, team_work(chain))
+    found = found.reshape(*states.shape[:2], -1)[:, :, 2:]
+    coefficients, own = np.zeros((len(joints), axes, axes, axes)), found[:, pairs[:, 0] == pairs[:, 1]]
+    for number, (j, k) in enumerate(pairs):
+        both = found[:, number]
+        coefficients[:, :, j, k] = np.abs(both if j == k else both - own[:, j] - own[:, k])
     return coefficients
-
-
-@compiled
-def _write_coefficients(
-    chain: FloatArray, joints: FloatArray, work: TeamWork, coefficients: FloatArray
-) -> None:
-    """Write the sizes of all coefficients, by the accelerations at unit rates of one axis and of two."""
-    axes = joints.shape[1] + 1
-    n = axes + 2
-    state, efforts, own, found = np.zeros(2 * n), np.zeros(n), np.empty((axes, axes)), np.empty(n)
-    nothing, nowhere = np.empty(0, dtype=np.int64), np.empty((0, 3))
-    for c in range(joints.shape[0]):
-        state[3:n] = joints[c]
-        for j in range(axes):
-            for k in range(j, -1, -1):  # Axis j alone comes first, then with every axis before it.
-                state[n:] = 0.0
-                state[n + 2 + j] = state[n + 2 + k] = 1.0
-                team_accelerations(chain, nothing, nowhere, nowhere, efforts, 0.0, state, work, found)
-                for i in range(axes):
-                    if k == j:
-                        own[j, i] = found[2 + i]
-                        coefficients[c, i, j, j] = abs(own[j, i])
-                    else:
-                        coefficients[c, i, j, k] = abs(found[2 + i] - own[j, i] - own[k, i])

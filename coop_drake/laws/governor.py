@@ -37,7 +37,6 @@ robot finds the object's velocity from its own joints, with its own rounding err
 robots have the same number, and therefore the same p_G, bit by bit."""
 
 
-@compiled
 def slowdown_radius(max_speed: float, governor_gain: float) -> float:
     """Return the distance from its target at which the field (13) starts to slow down [m].
 

@@ -31,7 +31,6 @@ from coop_drake.laws.governor import (
     energy_margin,
     governed_acceleration,
     governor_velocity,
-    slowdown_radius,
     steady_clearance,
     tracking_energy,
 )
@@ -146,7 +145,7 @@ def _rates(
         ux, uy = aim_x - x, aim_y - y
         norm = hypot(ux, uy)
         if norm > 0.0:
-            radius = slowdown_radius(FIELD_SPEED, gain)
+            radius = gain * FIELD_SPEED / ATTRACTION_RATE  # as ``slowdown_radius``
             speed = FIELD_SPEED * min(1.0, hypot(path[-1, 0] - x, path[-1, 1] - y) / radius)
             vx, vy = speed * ux / norm, speed * uy / norm
         result[4], result[5] = governor_velocity(vx, vy, driving, stiffness, gain, row[SMOOTHING])

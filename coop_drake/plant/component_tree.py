@@ -394,3 +394,16 @@ def base_components(team: TeamPlant, groups: list[set[int]]) -> tuple[int, ...]:
     """Return the component of every robot's base, given the bodies of every component."""
     bases = [int(robot.base_body.index()) for robot in team.robots]
     return tuple(next(i for i, group in enumerate(groups) if base in group) for base in bases)
+
+
+def base_points(team: TeamPlant, tree: ComponentTree) -> tuple[tuple[int, ...], list[FloatArray]]:
+    """Return the component of every robot's base, and the origin of Bk in that component's frame [m]."""
+    components = base_components(team, component_bodies(team, tree)[0])
+    poses = tree.poses(np.zeros(3 + len(tree.joints)))
+    context = team.plant.CreateDefaultContext()
+    team.plant.SetPositions(context, np.zeros(team.plant.num_positions()))
+    places = [robot.base_body.EvalPoseInWorld(context).translation()[:2] for robot in team.robots]
+    return components, [
+        poses[component].inverse().apply(place[None])[0]
+        for component, place in zip(components, places, strict=True)
+    ]

@@ -16,7 +16,7 @@ from coop_drake.answers.problem import PlanningProblem
 from coop_drake.errors import ScenarioError
 from coop_drake.laws import ScheduledGains
 from coop_drake.laws.couplings import disagreement_coupling, rate_terms
-from coop_drake.plant.component_tree import base_components, component_bodies, read_component_tree
+from coop_drake.plant.component_tree import base_points, component_bodies, read_component_tree
 from coop_drake.plant.parsing import bodies_of, joints_of, read_once
 from coop_drake.plant.planar_model import bodies_inertia, rotor_inertia
 from coop_drake.plant.team import TeamPlant, build_team_plant, displacement
@@ -161,13 +161,8 @@ def moved_bodies(scenario: Scenario, team: TeamPlant) -> Bodies:
 
 def base_frames(team: TeamPlant, tree: ComponentTree) -> tuple[tuple[float, ...], ...]:
     """Return the component of every robot's base, and the origin of Bk in it [m]."""
-    plant, (groups, origins) = team.plant, component_bodies(team, tree)
-    context, frames = plant.CreateDefaultContext(), []
-    plant.SetPositionsAndVelocities(context, np.zeros(plant.num_multibody_states()))
-    for robot, component in zip(team.robots, base_components(team, groups), strict=True):
-        place = plant.EvalBodyPoseInWorld(context, robot.base_body).translation()[:2] - origins[component]
-        frames.append((float(component), *place.round(ROUNDED).tolist()))
-    return tuple(frames)
+    frames = zip(*base_points(team, tree), strict=True)
+    return tuple((float(component), *point.round(ROUNDED).tolist()) for component, point in frames)
 
 
 def joint_inertias(team: TeamPlant) -> FloatArray:

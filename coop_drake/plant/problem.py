@@ -18,8 +18,8 @@ from shapely.geometry.base import BaseGeometry
 from coop_drake.answers.limits import TeamLimits
 from coop_drake.answers.problem import PlanningProblem, object_radius
 from coop_drake.errors import ScenarioError
-from coop_drake.plant.chain import limits_of, planar_pose
-from coop_drake.plant.component_tree import base_components, component_bodies, read_component_tree
+from coop_drake.plant.chain import limits_of
+from coop_drake.plant.component_tree import base_points, read_component_tree
 from coop_drake.plant.parsing import refusal
 from coop_drake.plant.team import RobotModel, TeamPlant, build_team_plant
 from coop_drake.scenario import Scenario, assemble
@@ -91,15 +91,7 @@ def read_limits(team: TeamPlant, tree: ComponentTree) -> TeamLimits:
     Raises:
         ScenarioError: A joint cannot move because a limit is zero.
     """
-    components = base_components(team, component_bodies(team, tree)[0])
-    poses = tree.poses(np.zeros(3 + len(tree.joints)))
-    context = team.plant.CreateDefaultContext()
-    team.plant.SetPositions(context, np.zeros(team.plant.num_positions()))
-    placed = [planar_pose(robot.base_body.EvalPoseInWorld(context)) for robot in team.robots]
-    points = [
-        poses[component].inverse().apply(np.array([[pose.x, pose.y]]))[0]
-        for component, pose in zip(components, placed, strict=True)
-    ]
+    components, points = base_points(team, tree)
     unknown, joints = np.full(len(team.robots), inf), _moving(team)
     return TeamLimits(
         base_components=components,
