@@ -1,6 +1,5 @@
 """Diagnoses of questions whose answer is known exactly."""
 
-import json
 from dataclasses import replace
 
 import numpy as np
@@ -166,14 +165,9 @@ def test_an_undecided_question_says_what_remained_mixed(monkeypatch):
     assert facts_of(diagnosis)["mixed"][0]["share_of_axis"] == diagnosis.mixed[0].width_fraction
 
 
-@pytest.mark.slow
-@pytest.mark.no_cover
-def test_the_same_question_has_the_same_diagnosis_and_picture(rod, tmp_path):
-    problem, first = rod
-    second = diagnose(problem)
-    assert json.dumps(facts_of(first)) == json.dumps(facts_of(second))
-    for number, diagnosis in enumerate((first, second)):
-        save_figure(diagnosis_figure(problem, diagnosis), tmp_path / f"{number}.svg")
+def test_the_same_diagnosis_has_the_same_picture(rod, tmp_path):
+    for number in range(2):
+        save_figure(diagnosis_figure(*rod), tmp_path / f"{number}.svg")
     assert (tmp_path / "0.svg").read_bytes() == (tmp_path / "1.svg").read_bytes()
 
 
