@@ -23,7 +23,6 @@ from coop_drake.planning.planner import plan, quicker_plans
 from coop_drake.planning.rescaling import Rescaling
 from coop_drake.planning.search import find_path
 from tests.planning.test_search import rod_problem
-from tests.support.cases import case
 from tests.support.channels import bent_channel
 from tests.support.point_mass import build_fields, carry_out
 
@@ -227,17 +226,9 @@ def test_hash_seeds_and_threads_change_no_byte(tmp_path: Path) -> None:
 # From the question to the goal without Drake: searched, tidied, mapped and carried out by a point mass.
 
 
-@pytest.fixture(scope="module")
-def base():
-    problem = case("base")
-    result = plan(problem, ScheduledGains(), gain_set_name="scheduled")
-    assert isinstance(result, Found)
-    return problem, result.plan
-
-
-def test_the_transport_arrives_in_time_and_stays_in_its_cells(base):
-    problem, made = base
-    check_plan(made, "base")
+def test_the_transport_arrives_in_time_and_stays_in_its_cells(problem):
+    made = effort_of(problem, 0.0).plan
+    check_plan(made, "rod")
     transport = carry_out(made, build_fields(made))
     assert transport.stuck is None
     assert float(np.sum(transport.durations)) <= 60.0
