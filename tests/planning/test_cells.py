@@ -496,16 +496,3 @@ def test_no_exploration_errs_however_often_regions_cannot_be_cut_or_parted(
         )
         outcome = Exploration(problem).run(200)
     assert outcome.verdict is not (Verdict.FOUND if corridor < 0.2 else Verdict.INFEASIBLE)
-
-
-@pytest.mark.slow
-@pytest.mark.no_cover
-@pytest.mark.parametrize(("name", "failure"), BROKEN)
-def test_a_search_that_cannot_cut_or_part_regions_never_errs(monkeypatch, name: str, failure) -> None:
-    monkeypatch.setattr(CrossSection, name, failure)
-    for corridor in (0.19, 0.3):
-        answer, _ = find_channel(rod_problem(corridor, PlannerSettings(max_slices=32)))
-        if corridor < 0.2:
-            assert isinstance(answer, NoChannel)
-        else:
-            assert not (isinstance(answer, NoChannel) and answer.proved)
