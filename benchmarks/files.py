@@ -11,6 +11,7 @@ import os
 import pickle
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from types import CodeType, FrameType, ModuleType
@@ -24,6 +25,8 @@ CLOSED = str(Path(__file__).parent / "scenarios" / "three_closed.scenario.yaml")
 DEPLOYED = "deployment: {preset: mobile_base, budget: all}"
 APART = ("apart",)
 """Folders that only robots as processes of their own need."""
+_SIMULATED_SECONDS = 2.0
+"""Simulated time in which the team of ``base`` enters its second cell [s]."""
 COMPILER = ("jit.py", "compiling.py")
 """Files that load machine code; they answer no question."""
 
@@ -94,6 +97,7 @@ def _ask(name: str, given: Path) -> None:
     window = QUESTIONS[name].window
     deployed = given.with_suffix(".scenario.yaml")
     scenario = coop_drake.load_scenario(deployed if name == "budget" else QUESTIONS[name].scenario)
+    scenario = replace(scenario, simulator=replace(scenario.simulator, max_time=_SIMULATED_SECONDS))
     plan = pickle.loads(given.read_bytes())
     maps = () if plan is None else coop_drake.build_maps(plan)
     ran: dict[CodeType, dict[str, Any]] = {}

@@ -110,6 +110,20 @@ def test_in_the_last_cell_a_sampled_robot_says_what_it_measures_besides_what_lea
     np.testing.assert_array_equal(evaluate(sampled, before, "ready"), expected)
 
 
+def test_no_robot_is_ready_while_its_monitor_is_not_quiet(cells):
+    inradii = [transition.inradius for transition in PLAN.transitions]
+    parts = cells, axis_laws(PLAN, AXES), inradii, PLAN.goal_pose[:2], POSITION_TOLERANCE
+    led = ReadyMonitor(*parts, nominal=True, measured=True)
+    inputs = {
+        **INPUTS,
+        "current_cell": [2.0, 0.0],
+        "nominal": [*PLAN.goal_pose[:2], 0.0, 0.0, 0.0, 0.0],
+    }
+    for alarm, arrival, expected in ((0.0, 0.4, 0.4), (1.0, 0.4, -1.0), (2.0, 0.4, -1.0), (1.0, -2.0, -2.0)):
+        report = evaluate(led, {**inputs, "arrival": [arrival], "alarm": [alarm, 1.1, 0.0]}, "ready")
+        assert report.tolist() == [2.0, expected]
+
+
 @pytest.fixture(scope="module")
 def cells():
     return governed_cells(PLAN)
