@@ -290,34 +290,16 @@ def ready_conditions(
 
 
 def robot_ready(
-    table: FloatArray,
-    next_table: FloatArray,
-    next_edges: FloatArray,
-    next_stiffness: float,
-    inradius: float,
-    goal: FloatArray,
-    tolerance: float,
-    last: bool,
-    time: float,
-    object_state: FloatArray,
-    robot: FloatArray,
-    governor_position: FloatArray,
-    nominal: FloatArray,
-) -> float:
+    known: ReadyConditions, time: float, object_state: FloatArray, robot: FloatArray,
+    governor_position: FloatArray, nominal: FloatArray,
+) -> float:  # fmt: skip
     """Return the margin with which one robot is ready for the next cell, ready if not negative.
 
     In the last cell it is the margin with which the goal is reached and the motion has ended; where a nominal
     motion leads, see ``robot_arrived`` instead.
 
     Args:
-        table: With the next seven the ``ReadyConditions`` of the current cell.
-        next_table: The axes in the next cell.
-        next_edges: Edges of the next cell.
-        next_stiffness: K with which it is entered.
-        inradius: R of the transition.
-        goal: Goal position.
-        tolerance: Tolerance of the goal position.
-        last: Whether this is the last cell.
+        known: The conditions of the current cell.
         time: Time since the current cell was entered [s].
         object_state: Pose and twist of the object, shape (6,).
         robot: (z_k, z_k'), shape (2 (3 + n),).
@@ -325,16 +307,16 @@ def robot_ready(
         nominal: What ``show_nominal`` writes, by which the position is judged then, shape (6,); or of shape
             (0,) where p_G follows what is measured.
     """
+    edges, stiffness = known.next_edges, known.next_stiffness
     if nominal.size:
-        margin = nominal_ready(next_edges, next_stiffness, nominal, governor_position)
-    elif last:
-        distance = np.hypot(object_state[0] - goal[0], object_state[1] - goal[1])
-        speed = np.hypot(object_state[3], object_state[4])
-        margin = position_arrival(distance, speed, tolerance)
+        margin = nominal_ready(edges, stiffness, nominal, governor_position)
+    elif known.last:
+        distance = np.hypot(*(object_state[:2] - known.goal))
+        margin = position_arrival(distance, np.hypot(*object_state[3:5]), known.tolerance)
     else:
-        margin, _ = cell_margin(next_edges, next_stiffness, object_state, governor_position)
-        margin = clearance_margin(margin, next_stiffness, inradius)
-    return min(margin, axes_ready(table, next_table, last, time, object_state, robot))
+        margin, _ = cell_margin(edges, stiffness, object_state, governor_position)
+        margin = clearance_margin(margin, stiffness, known.inradius)
+    return min(margin, axes_ready(known.table, known.next_table, known.last, time, object_state, robot))
 
 
 @compiled(borrows=True)
@@ -356,16 +338,12 @@ def robot_arrived(
         nominal: What ``show_nominal`` writes, shape (6,), or shape (0,) where no nominal motion leads.
         arrival: What ``arrival_margin`` gives.
     """
-    margin, n = arrival, table.shape[0] - 1
+    margin = arrival
     if nominal.size:
         distance = np.hypot(nominal[0] - goal[0], nominal[1] - goal[1])
         margin = min(margin, position_arrival(distance, np.hypot(nominal[2], nominal[3]), tolerance))
     if axes_led:
-        for i in range(1 + n):
-            position, rate = object_state[2], object_state[5]
-            if i > 0:
-                position, rate = robot[2 + i], robot[5 + n + i]
-            margin = min(margin, axis_arrival(table[i], position, rate))
+        margin = min(margin, axes_ready(table, table, True, 0.0, object_state, robot))
     return margin
 
 

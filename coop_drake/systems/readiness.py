@@ -76,7 +76,7 @@ class ReadyMonitor(Block):
             goal_position,
             position_tolerance,
         )
-        self._ready = [partial(kernels.robot_ready, *known) for known in conditions]
+        self._ready = [partial(kernels.robot_ready, known) for known in conditions]
         n = laws[0].axes - 1
         self._object = self.DeclareVectorInputPort("object_state", 6)
         self._state = self.DeclareVectorInputPort("robot_state", 2 * (3 + n))

@@ -18,7 +18,7 @@ def states(position, velocity, axes, rates):
 def margin_of(conditions, position, velocity, governor_position, axes, rates, time=10.0):
     """Return ``robot_ready`` of a robot whose conditions are given, ``time`` [s] after the cell's entry."""
     governor = np.array(governor_position, dtype=float)
-    return robot_ready(*conditions, time, *states(position, velocity, axes, rates), governor, NOTHING)
+    return robot_ready(conditions, time, *states(position, velocity, axes, rates), governor, NOTHING)
 
 
 def square_with_clearance(point, clearance):
