@@ -24,7 +24,6 @@ if TYPE_CHECKING:
     from coop_drake.answers.plan import Plan
     from coop_drake.answers.problem import PlanningProblem
     from coop_drake.scenario.model import Scenario
-    from coop_drake.viz.figures import RunFigures
 
 # Names of the figures that depend on the team.
 
@@ -43,7 +42,7 @@ def joints_figure_name(robot: int, name: str) -> str:
 
 # Processes that draw a run: its figures and its recording, beside the command.
 #
-# They import what they need while the command simulates, and prepare what the plan alone shows.
+# They import what they need while the command simulates, and prepare the recording of the plan.
 
 _CONTEXT = get_context("fork") if sys.platform == "linux" else get_context("spawn")
 """A copy has imported already what this process has; libraries of macOS may not be used in one."""
@@ -168,21 +167,18 @@ def _draw_recording(messages: Connection) -> None:
 
 
 def _draw_figures(messages: Connection) -> None:
-    from coop_drake.viz.figures import RunFigures
+    from coop_drake.viz.figures import figures_of, write_figures
 
     _, workspace, tree, plan = _next(messages)
-    figures = RunFigures(workspace, tree, plan)
     os.nice(_AFTER_RECORDING)
     gc.freeze()  # Else each collection of garbage would look at all that was imported.
-    _draw_in_two(figures, *_next(messages))
-
-
-def _draw_in_two(figures: RunFigures, log: SimulationLog, folder: Path) -> None:
+    log, folder = _next(messages)
+    run = workspace, tree, plan, log
     waiting, numbers = os.pipe()
-    os.write(numbers, bytes(reversed(range(len(figures.names(log))))))  # The summary takes longest.
+    os.write(numbers, bytes(reversed(range(len(figures_of(*run))))))  # The summary takes longest.
     os.close(numbers)
     other = os.fork() if (os.cpu_count() or 1) >= _MOST else None
-    figures.write(log, folder, numbers=_taken(waiting))
+    write_figures(*run, folder, numbers=_taken(waiting))
     if other and os.waitpid(other, 0)[1]:
         raise ProcessError("a process that draws figures was ended")
 

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -190,83 +189,45 @@ _SINGLE, _SEVERAL = 2.7, 1.8
 _GAP = 0.28
 """Space between two panels [in]: a legend fits."""
 
-_TICKED = (0.0, 8.5)
-"""Limits of axes that are made ahead, in any unit: they get nine ticks, the most that an axis has."""
 
+def time_axes(
+    log: SimulationLog,
+    caption: str,
+    labels: list[str],
+    *,
+    height: float | None = None,
+    switches: bool = True,
+) -> tuple[Figure, list[Axes]]:
+    """Return a figure with one panel per label, stacked over the axis of time, each of some height [in].
 
-class TimeAxes:
-    """Makes figures with panels over a common axis of time.
-
-    Some can be made ahead, before there is a log: most of the time that it takes to draw a curve goes into
-    ticks, which a figure makes when it is drawn first.
-
-    Args:
-        counts: Of every figure that is made ahead its number of panels.
+    A dashed vertical line marks every switch to the next cell, and the caption says so, unless ``switches``
+    is false.
     """
-
-    def __init__(self, counts: Iterable[int] = ()) -> None:
-        self._ahead = [(count, *_blank(count)) for count in counts]
-        for _, figure, axes in self._ahead:
-            for ax in axes:
-                ax.set(xlim=_TICKED, ylim=_TICKED)
-            figure.set_dpi(canvas.DPI)
-            figure.canvas.draw()
-            for ax in axes:
-                ax.set_autoscale_on(True)
-
-    def __call__(
-        self,
-        log: SimulationLog,
-        caption: str,
-        labels: list[str],
-        *,
-        height: float | None = None,
-        switches: bool = True,
-    ) -> tuple[Figure, list[Axes]]:
-        """Return a figure with one panel per label, stacked over the axis of time, each of some height [in].
-
-        A dashed vertical line marks every switch to the next cell, and the caption says so, unless
-        ``switches`` is false.
-        """
-        count = len(labels)
-        height = height or (_SINGLE if count == 1 else _SEVERAL)
-        if switches:
-            caption = f"{caption} Dashed lines mark the switches from cell to cell."
-        figure, axes = self._taken(count) or _blank(count)
-        figure.set_size_inches(_WIDTH, count * (height + _GAP) + 1.0)
-        canvas.set_margins(figure, caption, _MARGINS)
-        figure.subplots_adjust(hspace=_GAP / height)
-        marked = log.times[1:][np.diff(log.cell_index) != 0] if switches else []
-        for ax, label in zip(axes, labels, strict=True):
-            ax.set_ylabel(label)
-            ax.vlines(
-                marked,
-                0.0,
-                1.0,
-                transform=ax.get_xaxis_transform(),
-                colors=GREY,
-                linewidths=0.5,
-                linestyles=(0, (4, 3)),
-                zorder=0.5,
-            )
-        axes[0].set_xlim(0.0, max(float(log.times[-1]), 1e-9))
-        axes[-1].set_xlabel("time [s]")
-        return figure, list(axes)
-
-    def _taken(self, count: int) -> tuple[Figure, list[Axes]] | None:
-        """A figure that was made ahead, if there is one with so many panels; each is used once."""
-        found = next((entry for entry in self._ahead if entry[0] == count), None)
-        if found is None:
-            return None
-        self._ahead.remove(found)
-        return found[1], found[2]
-
-
-def _blank(count: int) -> tuple[Figure, list[Axes]]:
-    """A figure with so many empty panels over a common axis."""
-    figure = Figure()
+    count = len(labels)
+    height = height or (_SINGLE if count == 1 else _SEVERAL)
+    if switches:
+        caption = f"{caption} Dashed lines mark the switches from cell to cell."
+    figure = Figure(figsize=(_WIDTH, count * (height + _GAP) + 1.0))
     FigureCanvasAgg(figure)
-    return figure, list(figure.subplots(count, 1, sharex=True, squeeze=False)[:, 0])
+    axes = list(figure.subplots(count, 1, sharex=True, squeeze=False)[:, 0])
+    canvas.set_margins(figure, caption, _MARGINS)
+    figure.subplots_adjust(hspace=_GAP / height)
+    marked = log.times[1:][np.diff(log.cell_index) != 0] if switches else []
+    for ax, label in zip(axes, labels, strict=True):
+        ax.set_ylabel(label)
+        ax.vlines(
+            marked,
+            0.0,
+            1.0,
+            transform=ax.get_xaxis_transform(),
+            colors=GREY,
+            linewidths=0.5,
+            linestyles=(0, (4, 3)),
+            zorder=0.5,
+        )
+    axes[0].set_xlim(0.0, max(float(log.times[-1]), 1e-9))
+    axes[-1].set_xlabel("time [s]")
+    return figure, axes
 
 
 def break_at_switches(log: SimulationLog, values: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -281,17 +242,8 @@ def break_at_switches(log: SimulationLog, values: FloatArray) -> tuple[FloatArra
 
 # Figures of a run over time: the paper's Figures 6 to 13, and a summary of clearances, speeds and forces.
 
-_NONE_AHEAD = TimeAxes()
-"""Axes of which none are made before there is a log."""
 
-
-def panel_counts(tree: ComponentTree) -> list[int]:
-    """Numbers of panels of all figures over time in a run of a team, in no order that matters."""
-    robots = Counter(joint.robot for joint in tree.joints)
-    return [2, 2, 2, 1, *robots.values(), 2, 1, 3]
-
-
-def position_figure(log: SimulationLog, time_axes: TimeAxes = _NONE_AHEAD) -> Figure:
+def position_figure(log: SimulationLog) -> Figure:
     """Draw the object's position and the reference governor's over time."""
     caption = "Figure 6. Position of the object, and of the reference governor that leads it."
     figure, axes = time_axes(log, caption, ["x [m]", "y [m]"])
@@ -302,7 +254,7 @@ def position_figure(log: SimulationLog, time_axes: TimeAxes = _NONE_AHEAD) -> Fi
     return figure
 
 
-def angle_figure(log: SimulationLog, time_axes: TimeAxes = _NONE_AHEAD) -> Figure:
+def angle_figure(log: SimulationLog) -> Figure:
     """Draw the object's angle inside its funnel over time, and both measured from the funnel's middle."""
     caption = "Figure 7. Angle of the object between the bounds of its funnel; below, both measured from the "
     labels = ["θ [rad]", "θ, from the middle [rad]"]
@@ -315,9 +267,7 @@ def angle_figure(log: SimulationLog, time_axes: TimeAxes = _NONE_AHEAD) -> Figur
     return figure
 
 
-def joints_figure(
-    tree: ComponentTree, log: SimulationLog, robot: int, time_axes: TimeAxes = _NONE_AHEAD
-) -> Figure | None:
+def joints_figure(tree: ComponentTree, log: SimulationLog, robot: int) -> Figure | None:
     """Draw the joints of one robot inside their funnels over time; None for a robot without joints."""
     joints = [joint for joint in tree.joints if joint.robot == robot]
     if not joints:
@@ -333,7 +283,7 @@ def joints_figure(
     return figure
 
 
-def summary_figure(log: SimulationLog, time_axes: TimeAxes = _NONE_AHEAD) -> Figure:
+def summary_figure(log: SimulationLog) -> Figure:
     """Draw the clearances, which must stay above zero, the speeds and the bases' forces over time."""
     caption = (
         "Summary. Smallest distance of the team to the walls and between bodies; speed of the object and of "
@@ -358,9 +308,7 @@ def summary_figure(log: SimulationLog, time_axes: TimeAxes = _NONE_AHEAD) -> Fig
     return figure
 
 
-def curves_figure(
-    log: SimulationLog, time_axes: TimeAxes, caption: str, values: FloatArray, *labels: str
-) -> Figure:
+def curves_figure(log: SimulationLog, caption: str, values: FloatArray, *labels: str) -> Figure:
     """Draw one curve of the object over time in every panel; values of shape (T, panels)."""
     figure, axes = time_axes(log, caption, list(labels))
     for ax, curve in zip(axes, values.T, strict=True):
@@ -381,68 +329,51 @@ def _draw_funnel(ax: Axes, log: SimulationLog, axis: int, origin: FloatArray) ->
 
 
 def write_figures(
-    workspace: Polygon, tree: ComponentTree, plan: Plan, log: SimulationLog, directory: Path
+    workspace: Polygon,
+    tree: ComponentTree,
+    plan: Plan,
+    log: SimulationLog,
+    directory: Path,
+    *,
+    numbers: Iterable[int] | None = None,
 ) -> list[Path]:
     """Write figures 4 to 13 of the paper and a summary of the margins as PNG; return the files written.
 
-    Figures 10 and 11 show one robot each; those of further robots are called Figure 11, too.
+    Figures 10 and 11 show one robot each; those of further robots are called Figure 11, too. Where several
+    processes write them, each gets the ``numbers`` of those that it shall write, see `figures_of`.
     """
-    return RunFigures(workspace, tree, plan).write(log, directory)
+    written, known = [], figures_of(workspace, tree, plan, log)
+    with canvas.house_style():
+        for name, draw in known if numbers is None else (known[number] for number in numbers):
+            figure = draw()
+            if figure is not None:
+                written.append(write_atomically(directory / f"{name}.png", canvas.picture_of(figure)))
+    return written
 
 
-class RunFigures:
-    """The figures of a run. What the plan and the team alone show is drawn at once."""
-
-    def __init__(self, workspace: Polygon, tree: ComponentTree, plan: Plan) -> None:
-        self._workspace, self._tree = workspace, tree
-        with canvas.house_style():
-            self._start_and_goal = canvas.picture_of(start_and_goal_figure(workspace, tree, plan))
-            self._time_axes = TimeAxes(panel_counts(tree))
-
-    def write(
-        self, log: SimulationLog, directory: Path, *, numbers: Iterable[int] | None = None
-    ) -> list[Path]:
-        """Write the figures of a run as `write_figures` does.
-
-        Where several processes write them, each gets the ``numbers`` of those that it shall write.
-        """
-        written = []
-        known = list(self._figures(log))
-        with canvas.house_style():
-            for name, draw in known if numbers is None else (known[number] for number in numbers):
-                figure = draw()
-                if figure is not None:
-                    picture = figure if isinstance(figure, bytes) else canvas.picture_of(figure)
-                    written.append(write_atomically(directory / f"{name}.png", picture))
-        return written
-
-    def names(self, log: SimulationLog) -> list[str]:
-        """Names of the figures of a run, in the order of their numbers, from 0."""
-        return [name for name, _ in self._figures(log)]
-
-    def _figures(self, log: SimulationLog) -> Iterator[tuple[str, Callable[[], Figure | bytes | None]]]:
-        yield "fig04_start_and_goal", lambda: self._start_and_goal
-        yield from _figures(self._workspace, self._tree, log, self._time_axes)
-
-
-def _figures(
-    workspace: Polygon, tree: ComponentTree, log: SimulationLog, axes: TimeAxes
-) -> Iterator[tuple[str, Callable[[], Figure | None]]]:
-    """Name every figure of a log, with what draws it; a robot without joints has none of them."""
-    yield "fig05_path", partial(path_figure, workspace, tree, log)
-    yield "fig06_position", partial(position_figure, log, axes)
-    yield "fig07_angle", partial(angle_figure, log, axes)
-    curves = partial(curves_figure, log, axes)
-    twist, wrench = log.object_twist, log.object_wrench
-    caption = "Figure 8. Linear velocity of the object."
-    yield "fig08_velocity", partial(curves, caption, twist[:, :2], "x velocity [m/s]", "y velocity [m/s]")
-    caption = "Figure 9. Angular velocity of the object."
-    yield "fig09_angular_velocity", partial(curves, caption, twist[:, 2:], "angular velocity [rad/s]")
-    for robot, name in enumerate(log.robot_names):
-        draw = partial(joints_figure, tree, log, robot, axes)
-        yield joints_figure_name(robot, name), draw
-    caption = "Figure 12. Total force that the robots apply to the object."
-    yield "fig12_force", partial(curves, caption, wrench[:, :2], "x force [N]", "y force [N]")
-    caption = "Figure 13. Total torque that the robots apply to the object, about its centre of mass."
-    yield "fig13_torque", partial(curves, caption, wrench[:, 2:], "torque [N m]")
-    yield "summary", partial(summary_figure, log, axes)
+def figures_of(
+    workspace: Polygon, tree: ComponentTree, plan: Plan, log: SimulationLog
+) -> list[tuple[str, Callable[[], Figure | None]]]:
+    """Name every figure of a run, with what draws it; a robot without joints has none of them."""
+    curves, twist, wrench = partial(curves_figure, log), log.object_twist, log.object_wrench
+    velocity, turning = (
+        "Figure 8. Linear velocity of the object.",
+        "Figure 9. Angular velocity of the object.",
+    )
+    force = "Figure 12. Total force that the robots apply to the object."
+    torque = "Figure 13. Total torque that the robots apply to the object, about its centre of mass."
+    return [
+        ("fig04_start_and_goal", partial(start_and_goal_figure, workspace, tree, plan)),
+        ("fig05_path", partial(path_figure, workspace, tree, log)),
+        ("fig06_position", partial(position_figure, log)),
+        ("fig07_angle", partial(angle_figure, log)),
+        ("fig08_velocity", partial(curves, velocity, twist[:, :2], "x velocity [m/s]", "y velocity [m/s]")),
+        ("fig09_angular_velocity", partial(curves, turning, twist[:, 2:], "angular velocity [rad/s]")),
+        *(
+            (joints_figure_name(robot, name), partial(joints_figure, tree, log, robot))
+            for robot, name in enumerate(log.robot_names)
+        ),
+        ("fig12_force", partial(curves, force, wrench[:, :2], "x force [N]", "y force [N]")),
+        ("fig13_torque", partial(curves, torque, wrench[:, 2:], "torque [N m]")),
+        ("summary", partial(summary_figure, log)),
+    ]

@@ -13,7 +13,6 @@ from PIL import Image
 
 from coop_drake.answers.speeds import base_speeds
 from coop_drake.diagram import TELEMETRY
-from coop_drake.drawing.canvas import house_style, picture_of
 from coop_drake.drawing.colours import INK, OBJECT, robot_colour
 from coop_drake.errors import ProcessError
 from coop_drake.laws import ScheduledGains
@@ -23,13 +22,11 @@ from coop_drake.viz import write_figures
 from coop_drake.viz.block_diagram import INPUTS, OUTPUTS, block_diagram_figure, signal_flow
 from coop_drake.viz.drawing_processes import DrawingProcesses
 from coop_drake.viz.figures import (
-    RunFigures,
-    TimeAxes,
     angle_figure,
     break_at_switches,
+    figures_of,
     joints_figure,
     path_figure,
-    position_figure,
     start_and_goal_figure,
     summary_figure,
 )
@@ -62,24 +59,14 @@ def test_a_run_gets_figures_4_to_13_and_a_summary_as_png(tmp_path):
 
 
 def test_the_same_run_gives_the_same_pictures_and_a_process_writes_only_those_that_it_is_given(tmp_path):
-    *known, log = run_of("elbow")
-    written = []
+    run, written = run_of("elbow"), []
+    names = [name for name, _ in figures_of(*run)]
+    assert sorted(names) == sorted(OF_EVERY_RUN + OF_TWO_ROBOTS)
     for folder in ("one", "other"):
-        figures = RunFigures(*known)
-        names = figures.names(log)
-        assert sorted(names) == sorted(OF_EVERY_RUN + OF_TWO_ROBOTS)
-        paths = figures.write(log, tmp_path / folder, numbers=iter([5, 2]))
+        paths = write_figures(*run, tmp_path / folder, numbers=iter([5, 2]))
         assert [path.stem for path in paths] == [names[5], names[2]]
         written.append([path.read_bytes() for path in paths])
     assert written[0] == written[1]
-
-
-def test_axes_made_ahead_give_the_same_pictures():
-    log = synthetic_log(case("elbow"))
-    with house_style():
-        ahead = TimeAxes([2, 3, 2])
-        for draw in (position_figure, angle_figure, summary_figure, position_figure):
-            assert picture_of(draw(log, ahead)) == picture_of(draw(log))
 
 
 def test_figure_4_labels_start_and_goal_on_equal_axes_in_metres():
