@@ -257,9 +257,9 @@ def convert(value: object, kind: Any, key: str = "") -> Any:
     return _validated(value if complete is None else complete(value), kind, kind, key)
 
 
-def convert_class(value: object, cls: type[T], key: str = "") -> T:
+def convert_class(value: object, cls: type[T]) -> T:
     """Convert a mapping to a dataclass, as :func:`convert` does."""
-    result: T = convert(value, cls, key)
+    result: T = convert(value, cls)
     return result
 
 

@@ -223,14 +223,14 @@ def distribution(values: FloatArray) -> Distribution | None:
     return Distribution(numbers.size, *np.quantile(numbers, (0.0, 0.05, 0.5, 0.95, 1.0)).tolist())
 
 
-def summarise(runs: Columns, every: Sequence[RunGroup], confidence: float) -> tuple[Group, ...]:
+def summarise(runs: Columns, every: Sequence[RunGroup]) -> tuple[Group, ...]:
     """Return how the runs of every scenario and tier went."""
     groups = []
     for scenario, tier, rows in every:
         arrived = rows[runs["arrived"][rows]]
         known = {one.name: distribution(runs[one.name][rows if one.margin else arrived]) for one in MEASURES}
         reasons = Counter(runs["reason"][rows[~runs["arrived"][rows]]].tolist()).most_common(_REASONS)
-        rate = loss_rate(rows.size - arrived.size, rows.size, confidence)
+        rate = loss_rate(rows.size - arrived.size, rows.size)
         measures = {name: values for name, values in known.items() if values is not None}
         groups.append(Group(scenario, tier, rate, tuple(reasons), measures))
     return tuple(groups)
@@ -350,7 +350,6 @@ def make_report(
     *,
     facts: Sequence[tuple[str, str]] = (),
     missing: int = 0,
-    confidence: float = CONFIDENCE,
 ) -> Report:
     """Compute a report from the table of a campaign's runs.
 
@@ -359,7 +358,6 @@ def make_report(
         runs: A pyarrow table with the columns of ``RunRecord``, None for no runs.
         facts: What was asked for: name and value.
         missing: Batches of the campaign that are not made yet.
-        confidence: Probability with which a true rate is not above its bound, at least [-].
     """
     if runs is None or runs.num_rows == 0:
         return Report(title, tuple(facts), None, 0, nan, (), (), missing)
@@ -368,10 +366,10 @@ def make_report(
     return Report(
         title,
         tuple(facts),
-        loss_rate(count_trials(known, ~known["arrived"]), count_trials(known), confidence),
+        loss_rate(count_trials(known, ~known["arrived"]), count_trials(known)),
         count_trials(known, known[SHARE] > 1.0),
         float(np.nanmax(known[SHARE])) if np.isfinite(known[SHARE]).any() else nan,
-        summarise(known, groups, confidence),
+        summarise(known, groups),
         worst_runs(known, groups),
         missing,
     )

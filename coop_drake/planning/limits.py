@@ -213,10 +213,8 @@ def _refusals(problem: PlanningProblem, plan: Plan) -> Iterator[Refusal]:
             yield Refusal("limits.joint_accelerations", cell, values[cell], limit, unit, joint.name)
 
 
-def _broken(
-    values: Sequence[float], sign: int, limit: str, allowed: float, unit: Unit, joint: str = ""
-) -> Iterator[Refusal]:
+def _broken(values: Sequence[float], sign: int, limit: str, allowed: float, unit: Unit) -> Iterator[Refusal]:
     """The cell that breaks a limit most: from above with sign 1, from below with -1."""
     cell = max(range(len(values)), key=lambda k: sign * values[k])
     if sign * values[cell] > sign * allowed:
-        yield Refusal(limit, cell, values[cell], allowed, unit, joint)
+        yield Refusal(limit, cell, values[cell], allowed, unit)

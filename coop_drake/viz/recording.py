@@ -21,7 +21,6 @@ from coop_drake.drawing.colours import GREY
 from coop_drake.drawing.solids import player_style
 from coop_drake.errors import CoopDrakeError
 from coop_drake.files import write_atomically
-from coop_drake.progress import Progress
 from coop_drake.scenario import Scenario
 from coop_drake.templates import rendered
 from coop_drake.tree.pose import FloatArray
@@ -47,11 +46,8 @@ from coop_drake.viz.scene import (
 # Starts a Meshcat server for this machine, without the line that Drake writes to standard error.
 
 
-def silent_meshcat(parameters: MeshcatParams | None = None) -> Meshcat:
-    """Start a Meshcat server and log no address; ``web_url()`` returns it.
-
-    Args:
-        parameters: Its settings; by default only browsers on this machine can open its page.
+def silent_meshcat() -> Meshcat:
+    """Start a Meshcat server that only browsers on this machine reach, and log no address.
 
     Raises:
         RuntimeError: No port is free.
@@ -59,7 +55,7 @@ def silent_meshcat(parameters: MeshcatParams | None = None) -> Meshcat:
     logger = logging.getLogger("drake")
     logger.addFilter(_is_no_address)
     try:
-        return Meshcat(parameters or MeshcatParams(host="localhost"))
+        return Meshcat(MeshcatParams(host="localhost"))
     finally:
         logger.removeFilter(_is_no_address)
 
@@ -263,16 +259,14 @@ _ARROW_ANGLE = 0.06
 """Largest error of an arrow's direction [rad]: arrows turn fast where forces are small."""
 
 
-def animation_of(
-    scene: TransportScene, log: SimulationLog, times: FloatArray, progress: Progress | None
-) -> MeshcatAnimation:
+def animation_of(scene: TransportScene, log: SimulationLog, times: FloatArray) -> MeshcatAnimation:
     """Return the tracks of all that moves, appears or grows; the trail is put into the scene.
 
     ``times`` are those of the frames, evenly spaced, shape (F,) [s].
     """
     tracks = Tracks(1.0 / (times[1] - times[0]) if len(times) > 1 else 1.0)
     states = np.hstack([log.object_pose, log.joints])
-    grasps = _add_bodies(tracks, scene, _at_times(log, states, times), progress)
+    grasps = _add_bodies(tracks, scene, _at_times(log, states, times))
     _add_arrows(tracks, scene, log, times, grasps)
     _add_trail(tracks, scene, _at_times(log, log.object_pose[:, :2], times))
     rows = np.searchsorted(log.times, times, side="right") - 1
@@ -287,23 +281,17 @@ def _at_times(log: SimulationLog, values: FloatArray, times: FloatArray) -> Floa
     return np.column_stack([np.interp(times, log.times, column) for column in values.T])
 
 
-def _add_bodies(
-    tracks: Tracks, scene: TransportScene, configurations: FloatArray, progress: Progress | None
-) -> FloatArray:
+def _add_bodies(tracks: Tracks, scene: TransportScene, configurations: FloatArray) -> FloatArray:
     """Move every body; return the positions of the grasps, shape (F, N, 3) [m]."""
     poses, grasps = [], []
-    for frame, z in enumerate(configurations):
+    for z in configurations:
         poses.append(scene.team.poses(z))
         grasps.append(scene.team.grasp_points(z))
-        if progress and frame % 50 == 0:
-            progress("recording", frame / len(configurations))
     for body, paths in enumerate(scene.team.paths):
         own = [at_frame[body] for at_frame in poses]
         positions, angles = np.array([X_WB.translation() for X_WB in own]), _turns(own)
         for path in paths:
             tracks.move(path, positions, angles, own[0].rotation())
-    if progress:
-        progress("recording", 1.0)
     return np.array(grasps)
 
 
@@ -338,18 +326,14 @@ _MOST_FRAMES = 4000
 """Largest number of frames; longer runs get fewer frames per second, so that the file stays small."""
 
 
-def write_recording(
-    scenario: Scenario, plan: Plan, log: SimulationLog, path: Path, *, progress: Progress | None = None
-) -> None:
+def write_recording(scenario: Scenario, plan: Plan, log: SimulationLog, path: Path) -> None:
     """Write the run as one self-contained HTML page; an interrupted write leaves no file behind."""
-    Recording(scenario, plan).write(log, path, progress)
+    Recording(scenario, plan).write(log, path)
 
 
-def recording_html(
-    scenario: Scenario, plan: Plan, log: SimulationLog, *, progress: Progress | None = None
-) -> str:
+def recording_html(scenario: Scenario, plan: Plan, log: SimulationLog) -> str:
     """Return a run as a page: the scene, an animation of what was logged, and a player."""
-    return Recording(scenario, plan).html(log, progress)
+    return Recording(scenario, plan).html(log)
 
 
 class Recording:
@@ -360,16 +344,16 @@ class Recording:
         self._scene = TransportScene(scenario, plan, silent_meshcat())
         self._scene.place_camera()
 
-    def write(self, log: SimulationLog, path: Path, progress: Progress | None = None) -> None:
+    def write(self, log: SimulationLog, path: Path) -> None:
         """Write the page as `write_recording` does."""
-        write_atomically(path, self.html(log, progress).encode())
+        write_atomically(path, self.html(log).encode())
 
-    def html(self, log: SimulationLog, progress: Progress | None = None) -> str:
+    def html(self, log: SimulationLog) -> str:
         """Return the page as `recording_html` does."""
         scenario, scene, duration = self._scenario, self._scene, float(log.times[-1])
         rate = min(scenario.visualization.frames_per_second, _MOST_FRAMES / max(duration, 1e-9))
         times = np.arange(0.0, duration + 0.5 / rate, 1.0 / rate)
-        scene.meshcat.SetAnimation(animation_of(scene, log, times, progress))
+        scene.meshcat.SetAnimation(animation_of(scene, log, times))
         content = page_content(
             scenario,
             self._plan,
@@ -381,8 +365,8 @@ class Recording:
         return with_overlay(scene.meshcat.StaticHtml(), content)
 
 
-def inline_frame(page: str, *, height: int = 600) -> str:
-    """Return HTML that shows a page inside a notebook's cell, ``height`` pixels tall."""
+def inline_frame(page: str) -> str:
+    """Return HTML that shows a page inside a notebook's cell, 600 pixels tall."""
     escaped = page.replace("&", "&amp;").replace('"', "&quot;")
-    frame = f'<iframe srcdoc="{escaped}" width="100%" height="{height}" style="border: 0"></iframe>'
+    frame = f'<iframe srcdoc="{escaped}" width="100%" height="600" style="border: 0"></iframe>'
     return f"<div>{frame}</div>"

@@ -138,22 +138,19 @@ class Rows:
         text = finding.format(*(array[at] for array in values))
         raise RefusalError(f"{name}[{place}]", f"at t = {self.log.times[first + at[0]]:.6g} s: {text}")
 
-    def require_same(
-        self, name: str, expected: FloatArray, tolerance: float | FloatArray, first: int = 0
-    ) -> float:
+    def require_same(self, name: str, expected: FloatArray, tolerance: float | FloatArray) -> float:
         """Refuse the first number of an array that is not what it should be; return the largest difference.
 
         Args:
             name: Name of the log's array.
-            expected: Values from row ``first`` on.
+            expected: Values of the first rows.
             tolerance: Largest difference, one for all or one for each entry.
-            first: The log's row that the first value belongs to.
         """
-        stated = np.asarray(getattr(self.log, name), dtype=float)[first : first + len(expected)]
+        stated = np.asarray(getattr(self.log, name), dtype=float)[: len(expected)]
         same = stated == expected  # also where both are infinite
         difference = np.abs(np.subtract(stated, expected, where=~same, out=np.zeros(stated.shape)))
         text = "is {:.9g}; expected {:.9g}"
-        self.require(difference <= tolerance, name, text, stated, expected, first=first)
+        self.require(difference <= tolerance, name, text, stated, expected)
         return float(difference.max(initial=0.0))
 
 
