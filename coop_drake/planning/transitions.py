@@ -30,7 +30,6 @@ from coop_drake.planning.limits import (
     speed_shares,
     stated_speeds,
 )
-from coop_drake.progress import Progress
 from coop_drake.tree.component_tree import nearest_turn
 from coop_drake.tree.pose import FloatArray
 
@@ -178,7 +177,6 @@ def make_plan(
     *,
     gain_set_name: str,
     targets: Sequence[FloatArray] | None = None,
-    progress: Progress | None = None,
 ) -> Plan:
     """Make a plan of a channel.
 
@@ -188,7 +186,6 @@ def make_plan(
         gain_set: Gains, fixed or to be scheduled.
         gain_set_name: Name under which the scenario knows them.
         targets: Points at which each box is left, the last one the goal; by default as ``exits`` has them.
-        progress: Called with a phase and the fraction of it that is done.
 
     Raises:
         PlanError: If the channel does not join the start to the goal.
@@ -200,11 +197,8 @@ def make_plan(
     if targets is None:
         targets = (*exits(channel), goal)
     entries = (start, *targets[:-1])
-    cells = []
-    for index, (box, entry, target) in enumerate(zip(channel.boxes, entries, targets, strict=True)):
-        cells.append(_cell(box, entry, target, index))
-        if progress is not None:
-            progress("tidying", (index + 1) / len(targets))
+    boxes = enumerate(zip(channel.boxes, entries, targets, strict=True))
+    cells = [_cell(box, entry, target, index) for index, (box, entry, target) in boxes]
     routes, transitions, resting = [], [], problem.start[2:]
     for index, (entry, target) in enumerate(zip(entries, targets, strict=True)):
         goals = goal_intervals(problem, channel, index)
