@@ -24,7 +24,7 @@ from coop_drake.scenario import Goal, ObjectPose, Scenario, Start, Workspace, du
 from coop_drake.scenario.model import DirectiveEntry, RobotLimits
 from coop_drake.tree.component_tree import ComponentTree, axis_levers
 from coop_drake.tree.pose import FloatArray
-from coop_drake.tree.team_arrays import TeamArrays, place
+from coop_drake.tree.team_arrays import TeamArrays, place_into
 
 _DRAWN, _REFINED = 4_000, 8_000
 """Configurations drawn anywhere, and drawn near the best one so far [-]: together some 20 ms."""
@@ -58,13 +58,13 @@ def _narrowest(
     refined: int,
 ) -> float:
     """Least extent along y of all configurations drawn whose bodies are apart [m]."""
-    least, best = inf, np.zeros(len(lower))
+    least, best, poses = inf, np.zeros(len(lower)), np.empty((len(team.links), 5))
     for k in range(drawn + refined):
         z = lower + random.random(len(lower)) * (upper - lower)
         if k >= drawn and least < inf:
             spread = 0.2 * (_FINEST / 0.2) ** ((k - drawn) / refined)
             z = np.minimum(np.maximum(best + spread * (z - 0.5 * (lower + upper)), lower), upper)
-        poses = place(team, z)
+        place_into(team, z, poses)
         extent = _extent(team, poses)
         if extent < least and bodies_apart(team, poses, 0.0, ALL):
             least, best = extent, z
