@@ -162,7 +162,7 @@ def test_an_undecided_question_says_what_remained_mixed(monkeypatch):
     said = " ".join(sentences_of(diagnosis))
     assert "neither free nor blocked" in said
     assert "planner.max_slices" in said
-    assert facts_of(diagnosis)["mixed"][0]["share_of_axis"] == diagnosis.mixed[0].width_fraction
+    assert facts_of(diagnosis)["mixed"][0]["width_fraction"] == diagnosis.mixed[0].width_fraction
 
 
 def test_the_same_diagnosis_has_the_same_picture(rod, tmp_path):
