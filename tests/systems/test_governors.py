@@ -18,7 +18,7 @@ from coop_drake.laws.nominal import carry_axes, nominal_flow
 from coop_drake.laws.ppc import ramped_gain
 from coop_drake.plant import build_team_plant
 from coop_drake.simulation import build_maps
-from coop_drake.systems.kernels import nominal_margins
+from coop_drake.systems.kernels import nominal_margins, step_nominal
 from tests.support.prescribed import prescribed_acceleration
 from tests.support.small_loop import governed_cells
 from tests.support.small_plan import small_plan
@@ -232,6 +232,19 @@ def test_the_nominal_motion_never_leaves_its_region_and_the_reference_keeps_its_
     steps = np.hypot(*np.diff(states[:, 4:6], axis=0).T)
     assert 0.5 * motion.tube.speed < steps.max() / motion.period <= motion.tube.speed * (1.0 + 1e-9)
     assert np.linalg.norm(states[-1, :2] - motion.targets[0]) < 1e-3
+
+
+@pytest.mark.parametrize("room", [1e-7, 1e-6, 1e-5, 1e-4])
+def test_where_little_room_is_left_the_reference_uses_half_of_it_and_follows_the_field(room):
+    (cells, motion), following = known(), np.empty(6)
+    cell, governor = cells[0], motion.start
+    speed = np.sqrt(cell.gains.stiffness) * (cell.clearance(governor) - room)
+    flow = nominal_flow(cell.gains.stiffness, cell.gains.damping, motion.period)
+    state = np.array([*governor, speed, 0.0, *governor])
+    step_nominal(*cell.known, flow, motion.period, 10.0, 1.0, state, following)
+    step, direction = following[4:] - governor, cell.field(governor)
+    assert np.linalg.norm(step) == pytest.approx(0.5 * room, rel=1e-6)
+    assert step @ direction == pytest.approx(np.linalg.norm(step) * np.linalg.norm(direction))
 
 
 def test_the_command_compares_measurements_with_the_nominal_state_of_their_time():
