@@ -10,7 +10,10 @@ from coop_drake.laws.axis_table import FADING_TIME, axis_table, bounds_of, track
 from coop_drake.laws.nominal import carry_axes
 from coop_drake.laws.ppc import fading
 from coop_drake.robustness.funnel_law import MEMORY, fit_law
+from coop_drake.robustness.leaving import _switching
 from coop_drake.robustness.nominal_axes import (
+    ACCELERATION,
+    COLUMNS,
     DISTANCE,
     V_REACH,
     X_REACH,
@@ -92,3 +95,30 @@ def test_a_larger_entry_set_leaves_less_distance():
     ]
     distances = [axis_sets(row, conditions, entry, 1).distance for entry in entries]
     assert distances[0] > distances[1] > distances[2] > 0.0
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_a_tube_is_left_from_each_rest_on_for_the_time_for_which_a_report_of_it_may_be_used(seed):
+    """Bounds are those of all samples at most so long after one at rest; pushes count since its report."""
+    generator = np.random.default_rng(seed)
+    tube, middle, since, leaving = generator.uniform(-1.0, 1.0, (40, COLUMNS)), 0.2, 3, 5
+    tube[:, [X_REACH, V_REACH, ACCELERATION]] = generator.uniform(0.0, 0.1, (40, 3))
+    reach, rate = 0.15, 0.3 if seed % 4 else 0.0
+    at_rest = [
+        k
+        for k in range(leaving, 40)
+        if abs(tube[k, X] - middle) <= reach + tube[k, X_REACH] and abs(tube[k, V]) <= rate + tube[k, V_REACH]
+    ]
+    left = sorted({k for first in at_rest for k in range(first, min(first + since + 1, 40))})
+    pushed = sorted({i for k in left for i in range(max(k - since, leaving), k + 1)})
+    low, high, slow, fast, now, since_report = _switching(tube, middle, (reach, rate), (since, leaving))
+    if not left:
+        assert low > high
+        return
+    assert (low, high) == pytest.approx(
+        ((tube[left, X] - tube[left, X_REACH]).min(), (tube[left, X] + tube[left, X_REACH]).max())
+    )
+    assert (slow, fast) == (
+        (tube[left, V] - tube[left, V_REACH]).min(), (tube[left, V] + tube[left, V_REACH]).max()
+    )  # fmt: skip
+    assert (now, since_report) == (tube[left, ACCELERATION].max(), tube[pushed, ACCELERATION].max())

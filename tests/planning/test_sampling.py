@@ -40,6 +40,7 @@ from coop_drake.planning.sampling.collision import (
     grid_inside,
     is_free,
     lay_grid,
+    ring_clearance,
     team_clearance,
 )
 from coop_drake.planning.sampling.narrow_passages import (
@@ -218,6 +219,22 @@ def test_middles_lie_inside_where_the_floor_is(name: str) -> None:
     middles = np.array([middle(grid, square) for square in range(grid.rows * grid.columns)])
     assert (grid.inside == shapely.contains_xy(FLOORS[name], middles)).all()
     assert grid.inside.any()
+
+
+@pytest.mark.parametrize("name", FLOORS)
+def test_a_point_is_as_far_from_the_walls_as_it_is_up_to_the_grid_s_reach(name: str) -> None:
+    floor, reach, here = FLOORS[name], 0.3, np.zeros((1, 2))
+    grid, (x_min, y_min, x_max, y_max) = lay_grid(polygon_rings(floor), reach), floor.bounds
+    points = np.random.default_rng(5).uniform(
+        (x_min - 0.5, y_min - 0.5), (x_max + 0.5, y_max + 0.5), (600, 2)
+    )
+    away = np.minimum(shapely.distance(floor.boundary, shapely.points(points)), reach)
+    found = [
+        ring_clearance(grid, here, 0, 1, 0.0, np.zeros(3), x, y, 1.0, 0.0, np.inf) for x, y in points.tolist()
+    ]
+    inside = shapely.contains_xy(floor, points)
+    np.testing.assert_allclose(found, np.where(inside, away, -1.0), atol=1e-7)
+    assert (away[inside] == reach).any()
 
 
 def test_a_floor_without_rings_has_no_squares() -> None:
