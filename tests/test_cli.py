@@ -5,10 +5,11 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
-from contextlib import redirect_stdout
+from contextlib import nullcontext, redirect_stdout
 from dataclasses import replace
 from io import StringIO
 from math import inf, nan
+from typing import ClassVar
 
 import numpy as np
 import pytest
@@ -23,9 +24,37 @@ from coop_drake.cli.task import read_task
 from coop_drake.errors import PlanError
 from coop_drake.viz import LivePage
 from tests.support.cli import invoke
-from tests.support.no_drawings import NoDrawings
 from tests.support.scenarios import MODELS, ROOM, write_scenario
 from tests.support.short_search import sample_little
+
+
+class NoDrawings(nullcontext):
+    """Stands in for ``DrawingProcesses``.
+
+    Attributes:
+        asked: Log and folder of every run that was to be drawn since this list was last emptied.
+        order: What was waited for in the last run; "none" first if it was to have no figures.
+    """
+
+    asked: ClassVar[list[tuple]] = []
+    order: ClassVar[list[str]] = []
+
+    def __init__(self, *, figures=True):
+        super().__init__()
+        self.order[:] = [] if figures else ["none"]
+
+    def __enter__(self):
+        return self
+
+    def begin(self, *question):
+        pass
+
+    def draw(self, *asked):
+        self.asked.append(asked)
+
+    def wait(self, *subjects):
+        self.order.extend(subjects)
+
 
 PLAN_KEYS = {
     "answer",

@@ -11,14 +11,18 @@ from functools import cache
 from types import UnionType
 from typing import NamedTuple, Union, get_args, get_origin
 
+import numpy as np
 import pytest
 
 from coop_drake.answers.budget import LIMITS
+from coop_drake.answers.digest import problem_digest
 from coop_drake.answers.document import Document
 from coop_drake.answers.plan import Plan
 from coop_drake.answers.plan_file import plan_document, read_plan
+from coop_drake.answers.problem import PlanningProblem
 from coop_drake.errors import PlanError, RefusalError
 from coop_drake.laws import ScheduledGains
+from coop_drake.planning.duration import timed
 from coop_drake.planning.planner import plan as make
 from coop_drake.planning.transitions import with_gains
 from coop_drake.plant import planning_problem
@@ -32,9 +36,20 @@ from coop_drake.verification import verify_plan
 from coop_drake.verification.budget_origin import check_origin
 from coop_drake.verification.gains import check_ages
 from tests.support.certificates import GAINS, room_with_pillar
-from tests.support.last_cells import last_cells
 from tests.support.scenarios import MODELS
 from tests.support.small_scenario import small_scenario
+
+
+def last_cells(plan: Plan, problem: PlanningProblem, count: int) -> tuple[Plan, PlanningProblem]:
+    """The last cells of a plan, and the question that they answer: from rest where the first is entered."""
+    before = plan.transitions[-count - 1]
+    start = np.concatenate([before.target, 0.5 * (before.goal_lower + before.goal_upper)])
+    asked = replace(problem, start=start)
+    cells, transitions = plan.cells[-count:], plan.transitions[-count:]
+    restart = plan.restart and replace(plan.restart, departures=plan.restart.departures[-count:])
+    ended = replace(plan, start=start, cells=cells, transitions=transitions, restart=restart)
+    return timed(replace(ended, problem=problem_digest(asked))), asked
+
 
 SCENARIOS = ("base", "warehouse", "three", "tight", "elbow")
 """The shipped scenarios that have a plan."""

@@ -17,6 +17,7 @@ from coop_drake.drawing.colours import INK, OBJECT, robot_colour
 from coop_drake.errors import ProcessError
 from coop_drake.laws import ScheduledGains
 from coop_drake.scenario import load_scenario
+from coop_drake.tree.component_tree import ComponentTree
 from coop_drake.tuning import CRITERIA, GainTrial, Limit, Objective, Search, TrialOutcome
 from coop_drake.viz import write_figures
 from coop_drake.viz.block_diagram import INPUTS, OUTPUTS, block_diagram_figure, signal_flow
@@ -34,9 +35,16 @@ from coop_drake.viz.tuning_figure import tuning_figure
 from tests.support.cases import case
 from tests.support.figure_names import OF_EVERY_RUN, OF_TWO_ROBOTS
 from tests.support.scenarios import MODELS
-from tests.support.sliding import with_sliding_joint
 from tests.support.small_loop import small_loop
 from tests.support.synthetic_log import synthetic_log, synthetic_plan
+
+
+def with_sliding_joint(tree: ComponentTree) -> ComponentTree:
+    """The same tree but for its last joint, which slides along its x axis, from -0.1 m to 0.1 m."""
+    last = tree.joints[-1]
+    slider = replace(last, kind="prismatic", axis=(1.0, 0.0), lower=-0.1, upper=0.1)
+    components = [replace(c, joint=slider) if c.joint == last else c for c in tree.components]
+    return replace(tree, components=tuple(components))
 
 
 def run_of(name):

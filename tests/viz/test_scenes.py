@@ -1,5 +1,6 @@
 """The live view and its page show the steps that they receive, the verdict and then the recording."""
 
+import base64
 import dataclasses
 import json
 import logging
@@ -8,6 +9,7 @@ import socket
 import threading
 from math import inf
 from types import SimpleNamespace
+from typing import Any
 from urllib.error import HTTPError
 from urllib.request import urlopen
 
@@ -26,9 +28,35 @@ from coop_drake.viz import LivePage, LiveView, inline_frame, live, recording_htm
 from coop_drake.viz.recording import kept_frames, page_content, silent_meshcat, with_overlay
 from coop_drake.viz.scene import TeamView, hex_colour, illustrations, paint_robots, set_stage
 from tests.support.cases import case
-from tests.support.recorded import paths, played, track
 from tests.support.scenarios import MODELS
 from tests.support.synthetic_log import synthetic_log, synthetic_plan
+
+_MESSAGE = re.compile(r'fetch\("data:application/octet-binary;base64,([A-Za-z0-9+/=]+)"\)')
+
+
+def messages(page: str) -> list[dict[str, Any]]:
+    """Every command of the page, in its order."""
+    return [umsgpack.unpackb(base64.b64decode(packed)) for packed in _MESSAGE.findall(page)]
+
+
+def paths(page: str) -> set[str]:
+    """Where something stands."""
+    return {message["path"] for message in messages(page) if message["type"] == "set_object"}
+
+
+def track(page: str, path: str, name: str) -> tuple[np.ndarray, np.ndarray]:
+    """Times [s] and values of the key frames of one property."""
+    (told,) = [message for message in messages(page) if message["type"] == "set_animation"]
+    (clip,) = [animation["clip"] for animation in told["animations"] if animation["path"] == path]
+    (keys,) = [one["keys"] for one in clip["tracks"] if one["name"] == f".{name}"]
+    times = np.array([key["time"] for key in keys]) / clip["fps"]
+    return times, np.array([key["value"] for key in keys])
+
+
+def played(page: str, path: str, name: str, times: np.ndarray) -> np.ndarray:
+    """The property as a browser shows it, on straight lines from key frame to key frame."""
+    keys, values = track(page, path, name)
+    return np.column_stack([np.interp(times, keys, column) for column in values.reshape(len(keys), -1).T])
 
 
 def sample(time, x, cell, force, *, arrived=False):
