@@ -20,7 +20,7 @@ from PIL import Image
 import coop_drake
 from coop_drake.answers import save_plan
 from coop_drake.answers.digest import problem_digest
-from coop_drake.cli import app, doctor, show
+from coop_drake.cli import app, doctor, options, show
 from coop_drake.cli.app import _OLD_NAMES, _PANELS
 from coop_drake.cli.task import Task
 from coop_drake.scenario import dump_scenario, load_scenario
@@ -80,6 +80,17 @@ def test_examples_are_commands_as_they_are(line):
         command, arguments = command.commands[first], arguments[arguments[0] == first :]
     scenario = command.make_context(name, arguments).params.get("scenario")
     assert scenario is None or scenario in TYPED
+
+
+def test_an_argument_of_a_command_may_be_called_output(capsys):
+    def tell(reporter, output: str):
+        reporter.facts["told"] = output
+
+    made = options.command(tell)
+    assert list(made.__signature__.parameters) == ["output", "machine", "quiet"]
+    with pytest.raises(typer.Exit):
+        made(output="here", machine=True, quiet=True)
+    assert json.loads(capsys.readouterr().out) == {"told": "here"}
 
 
 def test_a_shell_gets_a_completion_script():
