@@ -1,4 +1,4 @@
-"""Commands round the chain: help, examples, old names, doctor, schema, show; quiet when piped."""
+"""Commands round the chain: help, examples, old names, completion, doctor, schema, show; quiet when piped."""
 
 from __future__ import annotations
 
@@ -22,6 +22,7 @@ from coop_drake.answers import save_plan
 from coop_drake.answers.digest import problem_digest
 from coop_drake.cli import app, doctor, options, show
 from coop_drake.cli.app import _OLD_NAMES, _PANELS
+from coop_drake.cli.options import complete_gains, complete_scenario
 from coop_drake.cli.task import Task
 from coop_drake.scenario import dump_scenario, load_scenario
 from coop_drake.scenario.document import parse
@@ -102,6 +103,25 @@ def test_a_shell_gets_a_completion_script():
     assert "coop-drake" in done.stdout
 
 
+def test_scenarios_are_completed_from_folders_on_the_way(tmp_path, monkeypatch):
+    monkeypatch.chdir(MODELS.parent)
+    assert complete_scenario("models/b") == ["models/base.scenario.yaml"]
+    assert "models/" in complete_scenario("mod")
+    assert complete_scenario("nowhere/b") == []
+    assert complete_scenario("ba") == ["base"]
+
+
+def test_gain_sets_are_completed_from_the_scenario(tmp_path):
+    path = tmp_path / "own.scenario.yaml"
+    path.write_text("gains: {sets: {gentle: !FixedGains {stiffness: 3}}}\n")
+    context = typer.Context(COMMAND.commands["run"])
+    context.params["scenario"] = path
+    assert complete_gains(context, "") == ["gentle", "scheduled", "table_2"]
+    assert complete_gains(context, "g") == ["gentle"]
+    path.write_text("gains: [")
+    assert complete_gains(context, "") == ["scheduled", "table_2"]
+
+
 def test_the_schema_holds_for_every_shipped_scenario_and_for_all_that_is_spelt_out():
     validator = jsonschema.Draft202012Validator(scenario_schema())
     validator.check_schema(validator.schema)
@@ -142,7 +162,7 @@ def test_the_doctor_finds_nothing_wrong_here(tmp_path, monkeypatch):
     assert facts["healthy"] is True
     states = {finding["what"]: finding["state"] for finding in facts["findings"]}
     assert "opens port" in states["Meshcat"]
-    assert states.keys() >= {"Python", "drake", "numpy", "shapely", "numba", "Drake", "memory"}
+    assert states.keys() >= {"Python", "drake", "numpy", "shapely", "numba", "Drake", "fonts", "memory"}
     assert list(tmp_path.iterdir()) == []
 
 

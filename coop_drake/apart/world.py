@@ -149,7 +149,7 @@ class SampleExchange:
         self._asked: dict[int, tuple[float, float]] = {}
         self._sizes: list[int] = []
         self._stamps: Sequence[FloatArray] = ()
-        self._answered = dict[int, float]()
+        self._answered, self._ages = dict[int, float](), dict[int, float]()
         self._sampled, self._expected, self._unheard = -1, dict[int, tuple[int, float]](), set[int]()
 
     def trouble(self) -> str:
@@ -178,8 +178,10 @@ class SampleExchange:
         return {
             "name": messages.name_of(index),
             "state": there if since is None else missing,
+            "missing_since": since,
             "team_messages": 0 if shown is None else int(np.sum(shown.team_messages)),
             "refused": 0 if shown is None else shown.refused,
+            "age": self._ages.get(index),
         }
 
     def step(
@@ -387,7 +389,7 @@ class SampleExchange:
         if known is None or message.number >= known.number:
             self._last[sender, kind] = message
             if kind is not messages.Telemetry:
-                self._answered[sender] = time
+                self._answered[sender], self._ages[sender] = time, age
             if isinstance(message, messages.Effort) and message.rest:
                 self._rests[sender] = np.array(message.rest)
         if was_missing and kind is not messages.Telemetry and (self._pacing is not None or unheard):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections import Counter
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, astuple, dataclass
+from dataclasses import asdict, dataclass
 from decimal import ROUND_CEILING, Context, Decimal
 from math import isnan, nan
 from pathlib import Path
@@ -166,6 +166,12 @@ def percent_up(share: float) -> str:
 
 # Distributions of margins, time and forces, and the share of lost runs, by scenario and tier.
 
+_BINS = 30
+"""Bins of a histogram [-]: a hill of a figure is some hundred points wide."""
+
+_SAME = 4 * _BINS
+"""Values whose range is at most this many units in the last place count as one value [-]."""
+
 _REASONS = 5
 """Reasons for losses that are listed, the most frequent ones."""
 
@@ -181,6 +187,7 @@ class Distribution:
         median: Below it is one half.
         high: Below it are 95 %.
         largest: Largest value.
+        heights: Counts of values in bins of equal width from the smallest to the largest value.
     """
 
     count: int
@@ -189,9 +196,10 @@ class Distribution:
     median: float
     high: float
     largest: float
+    heights: tuple[int, ...]
 
 
-NOTHING = Distribution(0, nan, nan, nan, nan, nan)
+NOTHING = Distribution(0, nan, nan, nan, nan, nan, ())
 """The distribution of no values."""
 
 
@@ -220,7 +228,18 @@ def distribution(values: FloatArray) -> Distribution | None:
     numbers = values[np.isfinite(values)]
     if numbers.size == 0:
         return None
-    return Distribution(numbers.size, *np.quantile(numbers, (0.0, 0.05, 0.5, 0.95, 1.0)).tolist())
+    low, median, high = np.quantile(numbers, (0.05, 0.5, 0.95))
+    ends = float(numbers.min()), float(numbers.max())
+    return Distribution(
+        int(numbers.size), ends[0], float(low), float(median), float(high), ends[1], _heights(numbers, ends)
+    )  # fmt: skip
+
+
+def _heights(numbers: FloatArray, ends: tuple[float, float]) -> tuple[int, ...]:
+    """Return the counts in bins between the ends; all in the middle one where these would be rounding."""
+    if ends[1] - ends[0] <= _SAME * np.spacing(max(map(abs, ends))):
+        return tuple(numbers.size if place == _BINS // 2 else 0 for place in range(_BINS))
+    return tuple(int(height) for height in np.histogram(numbers, bins=_BINS, range=ends)[0])
 
 
 def summarise(runs: Columns, every: Sequence[RunGroup]) -> tuple[Group, ...]:
@@ -401,6 +420,8 @@ def write_report(report: Report, directory: Path, replay: Callable[[WorstRun], s
 
 def render_page(report: Report, replay: Callable[[WorstRun], str]) -> str:
     """Return the page as HTML; it needs no other file and no script."""
+    from coop_drake.campaign.report_figures import distributions_svg
+
     return rendered(
         "coop_drake.campaign",
         "report.html",
@@ -412,12 +433,10 @@ def render_page(report: Report, replay: Callable[[WorstRun], str]) -> str:
         worst=[(run, _shown(run.measure, run.margin), replay(run)) for run in report.worst],
         percent=percent,
         percent_up=percent_up,
-        distributions=[
-            (group, one, [*map(one.shown, astuple(group.measures[one.name])[1:])])
-            for group in report.groups
-            for one in MEASURES
-            if one.name in group.measures
-        ],
+        figures={
+            "margins": distributions_svg(report.groups, MARGINS),
+            "costs": distributions_svg(report.groups, COSTS),
+        },
         colours=colours,
     )
 

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import shlex
-from math import isnan
+from dataclasses import fields
+from math import isnan, nan
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -32,6 +33,9 @@ EXAMPLES = (
 
 
 _LOOPS = {"drake": "Drake's loop", "compiled": "the compiled loop"}
+
+_NAMES = "run", "scenario", "tier", "seed", "values", "digest"
+"""Columns of a record that say which run it is, not what it left."""
 
 campaign_app = typer.Typer(
     cls=FirstByDefault,
@@ -229,6 +233,7 @@ def _replay(
     _compare(drake, counted, reporter)
     if any(one.tier == "compiled" and one.first <= index < one.stop for one in batches):
         compiled = RunMaker(variation, plans, "compiled", folder.path / "logs").record(run)
+        _show_both(drake, compiled, reporter)
         _compare(compiled, _counted(index, "compiled", folder, batches), reporter)
     return code
 
@@ -252,6 +257,20 @@ def _compare(again: RunRecord, counted: dict[str, Any] | None, reporter: Reporte
         what = ", ".join(differing)
         raise ProcessError(f"run {again.run} of {loop} differs from the one that was counted in {what}")
     reporter.say(f"Run {again.run} of {loop} is the one that was counted, to the last bit")
+
+
+def _show_both(drake: RunRecord, compiled: RunRecord, reporter: Reporter) -> None:
+    """Show what a run left in both loops, and the differences of its numbers."""
+    rows, facts = [], {}
+    for name in (one.name for one in fields(drake) if one.name not in _NAMES):
+        first, second = getattr(drake, name), getattr(compiled, name)
+        facts[name] = [None if _same(value, nan) else value for value in (first, second)]
+        numbers = isinstance(first, float) and isinstance(second, float)
+        texts = [f"{value:.9g}" if isinstance(value, float) else str(value) for value in (first, second)]
+        rows.append((name, *texts, f"{second - first:.2g}" if numbers else ""))
+    reporter.facts["tiers"] = facts
+    headings = "Drake's loop", "the compiled loop", "difference"
+    reporter.table(f"Run {drake.run}", rows, headings, "column")
 
 
 def _same(first: Any, second: Any) -> bool:

@@ -65,7 +65,7 @@ def doctor_command(
     ] = False,
     clear_maps: Annotated[bool, typer.Option("--clear-maps", help="Delete all solved maps.")] = False,
 ) -> None:
-    """Check the installation: versions, Drake, Meshcat, compiled parts, memory, caches.
+    """Check the installation: versions, Drake, Meshcat, fonts, compiled parts, memory, caches.
 
     With an option it does what that says instead.
     """
@@ -181,6 +181,14 @@ def _meshcat() -> Finding:
     return Finding("Meshcat", f"opens port {silent_meshcat().port()}")
 
 
+def _fonts() -> Finding:
+    from matplotlib import rcParams
+    from matplotlib.font_manager import FontProperties, findfont
+
+    path = findfont(FontProperties(family=rcParams["font.family"]), fallback_to_default=False)
+    return Finding("fonts", Path(path).stem)
+
+
 def _kernels() -> Finding:
     from numba import config
 
@@ -196,12 +204,22 @@ def _memory() -> Finding:
     return Finding("memory", f"{total:.1f} GB", total >= _LEAST_MEMORY, remedy)
 
 
+def _cores() -> Finding:
+    return Finding("cores", str(os.cpu_count() or 1))
+
+
 def _cache() -> Finding:
     store = map_cache()
     store.folder.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryFile(dir=store.folder):
         pass
     return Finding("cache of maps", f"{len(store.files())} maps in {store.folder}, writable")
+
+
+def _results() -> Finding:
+    with tempfile.TemporaryFile(dir=Path.cwd()):
+        pass
+    return Finding("folder for results", f"{Path.cwd()}, writable")
 
 
 _CHECKS: tuple[tuple[str, Callable[[], Finding], str], ...] = (
@@ -212,8 +230,11 @@ _CHECKS: tuple[tuple[str, Callable[[], Finding], str], ...] = (
     ),
     ("shipped scenarios", _scenarios, "install coop-drake anew"),
     ("Meshcat", _meshcat, "free a port from 7000 on; without one there are recordings but no live view"),
+    ("fonts", _fonts, "install matplotlib anew"),
     ("compiled kernels", _kernels, "let numba write beside the package, or set NUMBA_CACHE_DIR"),
     ("memory", _memory, ""),
+    ("cores", _cores, ""),
     ("cache of maps", _cache, "let COOP_DRAKE_CACHE name a folder that can be written"),
+    ("folder for results", _results, "change to a folder that can be written, or use --out"),
 )
 """What is checked, by which function, and what to do if that raises an error."""

@@ -221,7 +221,7 @@ def _live_page(task: Task, plan: Plan, reporter: Reporter, options: RunOptions) 
     from coop_drake.viz import LivePage
     from coop_drake.viz.recording import silent_meshcat
 
-    with LivePage(task.scenario, plan, silent_meshcat()) as page:
+    with LivePage(task.scenario, plan, silent_meshcat(), facts=lambda: reporter.facts) as page:
         reporter.facts["live_url"] = page.url
         reporter.say(f"[bold]Live view: open {page.url} in a browser[/]")
         if options.wait or sys.stdout.isatty():

@@ -64,6 +64,10 @@ def tune_command(
         ),
     ] = None,
     gains: GainsName = None,
+    vary: Annotated[
+        list[str] | None,
+        typer.Option("--vary", metavar="GAIN", help="Gains that may change; all by default."),
+    ] = None,
     runs: Annotated[int, typer.Option("--runs", metavar="N", min=1, help="Runs to try.")] = 120,
     seed: Annotated[int, typer.Option("--seed", min=0, help="Seed of the search.")] = 0,
     workers: Annotated[
@@ -93,7 +97,7 @@ def tune_command(
     weights, kept = read_weights(wanted[0]), tuple(map(Limit.parse, wanted[1]))
     task = read_task(scenario, gains, reporter)
     start = task.scenario.gain_sets[task.scenario.selected_gains]
-    parameters = tunable_parameters(start)
+    parameters = tunable_parameters(start, vary or ())
     folder = ResultFolder.of(task.name, out, "plan", "tuning", below=_TUNED)
     plan = plan_of(task, folder, reporter)
     if plan is None:
@@ -117,11 +121,13 @@ def tune_command(
             found.verify(runner.simulate)
     folder.begin("tuning")
     _write_trials(found, folder.path / "trials.json")
-    after, tried = found.best.outcome, len(found.trials) - 1
-    if found.interrupted:  # Drawing would take longer than Ctrl-C may.
+    after, tried, anew = found.best.outcome, len(found.trials) - 1, None
+    if found.interrupted:  # Drawing and planning anew would take longer than Ctrl-C may.
         state = f"Not verified: interrupted after {tried} trials."
     else:
         write_tuning_figure(found, folder.path / "tuning.png")
+        with reporter.stage("planning anew"):
+            anew = runner.replan(task.problem, found.best.gains)
         state = "Verified: arrives, keeps all limits."
         if not objective.kept(after):
             state = "Not good: a limit is broken or the run failed."
@@ -133,7 +139,7 @@ def tune_command(
     path = write_gains(found.best.gains, remarks, folder.path / "gains.yaml")
     reporter.facts["gains_file"] = str(path)
     reporter.say(f"The gain set is in {escape(str(path))}; use it with --gains {escape(str(path))}")
-    _show(reporter, "Best so far" if found.interrupted else f"{task.name}, gains tuned", found, after)
+    _show(reporter, "Best so far" if found.interrupted else f"{task.name}, gains tuned", found, after, anew)
     if found.interrupted:
         reporter.complain("interrupted; the best so far is written")
         reporter.code = ExitCode.INTERRUPTED
@@ -169,7 +175,9 @@ def _write_trials(found: Search, path: Path) -> Path:
     return write_atomically(path, json.dumps(document, indent=1).encode() + b"\n")
 
 
-def _show(reporter: Reporter, title: str, found: Search, after: TrialOutcome) -> None:
+def _show(
+    reporter: Reporter, title: str, found: Search, after: TrialOutcome, anew: TrialOutcome | None
+) -> None:
     """Show every criterion before and after, and note the values."""
     from coop_drake.tuning import CRITERIA
 
@@ -178,7 +186,9 @@ def _show(reporter: Reporter, title: str, found: Search, after: TrialOutcome) ->
     for name, criterion in CRITERIA.items():
         change = 100.0 * (after.values[name] / before[name] - 1.0) if before[name] else 0.0
         wanted = " *" if name in found.objective.weights else ""
-        cells = f"{before[name]:.4g}", f"{after.values[name]:.4g}", f"{change:+.0f} %"
+        cells = [f"{before[name]:.4g}", f"{after.values[name]:.4g}", f"{change:+.0f} %"]
+        cells.append("" if anew is None else f"{anew.values[name]:.4g}" if anew.arrived else "fails")
         rows.append((escape(f"{criterion.label} [{criterion.unit}]{wanted}"), *cells))
-    reporter.table(f"{title} (* sought)", rows, ("before", "after", "change"))
+    reporter.table(f"{title} (* sought)", rows, ("before", "after", "change", "planned anew"))
     reporter.facts.update(before=dict(before), after=dict(after.values), trials=len(found.trials) - 1)
+    reporter.facts["planned_anew"] = None if anew is None else dict(anew.values)

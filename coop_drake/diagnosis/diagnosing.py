@@ -24,11 +24,13 @@ from coop_drake.diagnosis.variants import (
     BlockingPassage,
     Bracket,
     BudgetedPlanner,
+    OpenFloor,
     Outcome,
     UniformWidening,
     WidenedFloor,
     blocking_passages,
     bracketed,
+    on_open_floor,
 )
 from coop_drake.planning import Channel, find_channel
 from coop_drake.planning.proofs import blocked_goal
@@ -346,6 +348,7 @@ class PassageFindings:
         needed: How far that path leaves the floor as it is, at its configurations, not proved [m].
         passages: The passages that block, in the order of the path.
         are_enough: Whether a channel was found with only these passages widened.
+        open_floor: What is known without walls, where no widening was enough.
     """
 
     widening: Bracket
@@ -353,6 +356,7 @@ class PassageFindings:
     needed: float | None = None
     passages: tuple[BlockingPassage, ...] = ()
     are_enough: bool = False
+    open_floor: OpenFloor | None = None
 
 
 @dataclass(frozen=True)
@@ -540,7 +544,9 @@ def find_passages(
         refuted=0.0 if refuted else None,
         improve=improve,
     )
-    if bracket.found is None or bracket.outcome is None or bracket.outcome.path is None:
+    if bracket.found is None or bracket.outcome is None:
+        return PassageFindings(bracket, open_floor=on_open_floor(problem, planner))
+    if bracket.outcome.path is None:
         return PassageFindings(bracket)
     path = clear_elsewhere(eased, bracket.outcome.path, bracket.found)
     needed = max(deepest(problem.workspace, problem.tree, z) for z in path)

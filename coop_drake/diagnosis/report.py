@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import fields, is_dataclass
-from enum import Enum
 from math import degrees
 from typing import Any
 
@@ -14,13 +12,12 @@ from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.patches import Circle
 from shapely import Point
-from shapely.geometry.base import BaseGeometry
 
 from coop_drake.answers import PlanningProblem
 from coop_drake.answers.plan import MixedCell
 from coop_drake.diagnosis.contacts import BodyAtFault
 from coop_drake.diagnosis.diagnosing import BlockedPose, Diagnosis, PassageFindings, Relaxation
-from coop_drake.diagnosis.variants import Answer, BlockingPassage
+from coop_drake.diagnosis.variants import Answer, BlockingPassage, Bracket, OpenFloor
 from coop_drake.drawing import draw_polygon, draw_workspace, new_figure, team_footprints
 from coop_drake.drawing.colours import AT_FAULT, BLUE, GREY, INK, NOT_AT_FAULT, OUTSIDE, PAPER, WALL
 from coop_drake.geometry.polygons import parts_of
@@ -60,6 +57,18 @@ def _intervals(cell: MixedCell) -> str:
     return f"theta {theta} rad" + (f", joints{robots} {', '.join(joints)}" if joints else "")
 
 
+def mixed_facts(cell: MixedCell) -> dict[str, Any]:
+    """A mixed cell in plain numbers."""
+    return {
+        "robots": list(cell.robots),
+        "bounds": [float(value) for value in cell.polygon.bounds],
+        "lower": [float(value) for value in cell.lower],
+        "upper": [float(value) for value in cell.upper],
+        "share_of_axis": cell.width_fraction,
+        "below_resolution": cell.finest,
+    }
+
+
 # A diagnosis in sentences, as rows of a table, and as plain numbers.
 
 Row = tuple[str, str]
@@ -84,7 +93,8 @@ def _passage_sentences(findings: PassageFindings) -> list[str]:
     widening, count = findings.widening, len(findings.passages)
     if widening.found is None:
         known = "proved not to be" if widening.is_refuted else "not found"
-        return [f"Moving every wall back by up to {widening.most:.3f} m was {known} enough."]
+        back = f"Moving every wall back by up to {widening.most:.3f} m was {known} enough."
+        return [back, *_open_floor_sentences(findings.open_floor)]
     if not count:
         refuted = f"; by {widening.refuted:.3f} m was proved too little" if widening.refuted else ""
         return [f"Moving every wall back by {widening.found:.3f} m was found enough{refuted}."]
@@ -95,6 +105,18 @@ def _passage_sentences(findings: PassageFindings) -> list[str]:
     known = "found" if findings.are_enough else "not found"
     these = "this passage" if count == 1 else f"these {count} passages"
     return [*sentences, f"Widening only {these} was {known} enough."]
+
+
+def _open_floor_sentences(floor: OpenFloor | None) -> list[str]:
+    if floor is None:
+        return []
+    if floor.answer is Answer.FOUND:
+        return ["Without any walls there is a path: the walls must move back by more than was tried."]
+    proved = floor.answer is Answer.INFEASIBLE
+    known = "It is proved that there is no path" if proved else "No path was found"
+    return [f"{known} even without walls: the bodies may be in each other's way."] + [
+        f"A path exists if {first} and {second} are allowed to overlap." for first, second in floor.pairs
+    ]
 
 
 def _where(passage: BlockingPassage) -> str:
@@ -165,26 +187,73 @@ def _relaxation(relaxation: Relaxation) -> str:
 
 
 def facts_of(diagnosis: Diagnosis) -> dict[str, Any]:
-    """The findings as numbers, texts, lists and dictionaries, by the names of their fields."""
-    return {"sentences": sentences_of(diagnosis), **_plain(diagnosis)}
+    """The findings as numbers, texts, lists and dictionaries, by the names that machines read."""
+    facts: dict[str, Any] = {
+        "answer": diagnosis.answer.value,
+        "reason": diagnosis.reason,
+        "slices": diagnosis.slices,
+        "sentences": sentences_of(diagnosis),
+    }
+    findings, goal = diagnosis.passages, diagnosis.goal
+    if findings is not None:
+        facts["walls_moved_back_m"] = _bracket_facts(findings.widening)
+        facts["way_sticks_out_m"] = findings.needed
+        facts["widening_passages_is_enough"] = findings.are_enough
+        if findings.open_floor is not None:
+            pairs = [list(pair) for pair in findings.open_floor.pairs]
+            answer = findings.open_floor.answer.value
+            facts["without_walls"] = {"answer": answer, "pairs_in_the_way": pairs}
+        facts["passages"] = [_passage_facts(passage) for passage in findings.passages]
+    if goal is not None:
+        facts["goal"] = {
+            "configuration": goal.configuration.tolist(),
+            "contacts": [
+                {"body": c.body, "sticks_out_m": c.depth, "wall": c.wall.tolist()} for c in goal.contacts
+            ],
+            "overlaps": [{"bodies": list(o.bodies), "depth_m": o.depth} for o in goal.overlaps],
+            "walls_moved_back_m": _bracket_facts(goal.widening),
+        }
+    if diagnosis.mixed:
+        facts["mixed"] = [mixed_facts(cell) for cell in diagnosis.mixed]
+    facts["relaxations"] = [
+        {
+            "name": relaxation.change.name,
+            "unit": relaxation.change.unit,
+            **_bracket_facts(relaxation.bracket),
+            "proved_never_enough": relaxation.never_enough,
+        }
+        for relaxation in diagnosis.relaxations
+    ]
+    return facts
 
 
-_LEFT_OUT = ("outcome", "path", "tree", "zone")
-"""Fields that no machine needs: changed questions, their paths, shapes for pictures."""
+def _bracket_facts(bracket: Bracket) -> dict[str, Any]:
+    return {
+        "proved_too_little": bracket.refuted,
+        "found_enough": bracket.found,
+        "largest_tried": bracket.most,
+        "proved_never_enough": bracket.is_refuted,
+    }
 
 
-def _plain(value: Any) -> Any:
-    """Return plain data of findings; of shapes their bounds."""
-    if is_dataclass(value):
-        shown = (one.name for one in fields(value) if one.name not in _LEFT_OUT)
-        return {name: _plain(getattr(value, name)) for name in shown}
-    if isinstance(value, tuple):
-        return [_plain(item) for item in value]
-    if isinstance(value, BaseGeometry):
-        return list(value.bounds)
-    if isinstance(value, Enum):
-        return value.value
-    return value.tolist() if isinstance(value, np.ndarray) else value
+def _passage_facts(passage: BlockingPassage) -> dict[str, Any]:
+    stretch, gap = passage.stretch, passage.stretch.gap
+    return {
+        "walls": None if gap is None else [gap.first.tolist(), gap.second.tolist()],
+        "width_m": None if gap is None else gap.width,
+        "missing_m_proved_above": None if passage.refuted is None else 2.0 * passage.refuted,
+        "missing_m_found_enough": 2.0 * passage.enough,
+        "configuration": stretch.configuration.tolist(),
+        "joints_at_limit": list(stretch.limits),
+        "bodies": [
+            {
+                "name": body.name,
+                "sticks_out_m": body.depth,
+                "intervals": {n: list(i) for n, i in zip(body.axes, body.intervals, strict=True)},
+            }
+            for body in stretch.bodies
+        ],
+    }
 
 
 def _point(values: FloatArray) -> str:

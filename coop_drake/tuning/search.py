@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from coop_drake.answers import Plan
+from coop_drake.answers import Found, Plan, PlanningProblem
 from coop_drake.compiled_loop import CompiledTransport, prepare, run, with_gains
 from coop_drake.compiled_loop.running import check_deployment
 from coop_drake.errors import ScenarioError, TuningError
@@ -23,8 +23,9 @@ from coop_drake.harmonic_maps import HarmonicMap
 from coop_drake.interrupts import uninterrupted
 from coop_drake.laws.gains import FixedGains, GainSet
 from coop_drake.planning import reschedule
+from coop_drake.planning.planner import plan
 from coop_drake.scenario import Scenario, load_scenario
-from coop_drake.simulation import simulate
+from coop_drake.simulation import build_maps, simulate
 from coop_drake.tree.pose import FloatArray
 from coop_drake.tuning.objective import CRITERIA, GainTrial, Objective, TrialOutcome, outcome_of
 
@@ -87,6 +88,14 @@ class TrialRunner:
         except ScenarioError:
             return None
         return transport
+
+    def replan(self, problem: PlanningProblem, gains: GainSet) -> TrialOutcome | None:
+        """Plan again with other gains, which may give other cells, and simulate; None if no plan is found."""
+        result = plan(problem, gains, gain_set_name="trial")
+        if not isinstance(result, Found):
+            return None
+        maps = build_maps(result.plan, tolerance=self._scenario.maps.tolerance)
+        return outcome_of(simulate(self._scenario, result.plan, maps), len(result.plan.cells))
 
 
 _runner: TrialRunner | None = None
@@ -215,13 +224,24 @@ _FIXED = (
 )
 
 
-def tunable_parameters(gain_set: GainSet) -> tuple[Parameter, ...]:
-    """Return the parameters of a gain set, their ranges widened so that they contain its gains."""
+def tunable_parameters(gain_set: GainSet, names: Sequence[str] = ()) -> tuple[Parameter, ...]:
+    """Return the parameters of a gain set, their ranges widened so that they contain its gains.
+
+    ``names`` are those of the gains that may change; all by default.
+
+    Raises:
+        TuningError: A name is no gain of this set that can be changed.
+    """
     tunable = _FIXED if isinstance(gain_set, FixedGains) else _SCHEDULED
-    values = [getattr(gain_set, parameter.name) for parameter in tunable]
+    known = {parameter.name: parameter for parameter in tunable}
+    for name in names:
+        if name not in known:
+            raise TuningError(f"--vary {name}: expected one of {', '.join(known)}")
+    chosen = [known[name] for name in dict.fromkeys(names)] if names else list(known.values())
+    values = [getattr(gain_set, parameter.name) for parameter in chosen]
     return tuple(
         replace(parameter, lower=min(parameter.lower, value), upper=max(parameter.upper, value))
-        for parameter, value in zip(tunable, values, strict=True)
+        for parameter, value in zip(chosen, values, strict=True)
     )
 
 

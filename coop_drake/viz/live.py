@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable, Mapping, Sequence
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 from threading import Lock, Thread
@@ -119,6 +120,7 @@ class LivePage:
         plan: What is executed.
         meshcat: Where it is shown; nothing has been drawn there yet.
         rate: Greatest ratio of simulated time to real time.
+        facts: Returns what is known about a run apart: its ``processes`` and ``stops``.
     """
 
     def __init__(
@@ -128,6 +130,7 @@ class LivePage:
         meshcat: Meshcat,
         *,
         rate: float = 1.0,
+        facts: Callable[[], Mapping[str, Any]] = dict,
     ) -> None:
         empty = meshcat.StaticHtml()  # Before the view draws: the page gets the scene from Meshcat's server.
         self._view = LiveView(scenario, plan, meshcat, rate=rate)
@@ -139,7 +142,7 @@ class LivePage:
         }
         self._page = with_overlay(empty, content, "live.html").encode()
         self._news: dict[str, Any] = {"details": "the run has not begun", "verdict": "", "recording": False}
-        self._cells = len(plan.cells)
+        self._cells, self._facts = len(plan.cells), facts
         self._recording: Path | None = None
         self._asked, self._loading, self._lock = -_ABSENT, 0, Lock()
         self._server = ThreadingHTTPServer(("localhost", 0), _handler(self))
@@ -190,7 +193,10 @@ class LivePage:
             return "text/html; charset=utf-8", self._page
         if path == "/news":
             self._asked = monotonic()
-            return "application/json", json.dumps(self._news).encode()
+            facts = self._facts()
+            rows = [process_row(process) for process in facts.get("processes", ())]
+            news = self._news | {"processes": rows, "stop": stop_words(facts.get("stops", ()))}
+            return "application/json", json.dumps(news).encode()
         if path == "/transport.html" and self._recording is not None:
             return "text/html; charset=utf-8", self._recording.read_bytes()
         return None
@@ -199,6 +205,27 @@ class LivePage:
         """Count the answers that are on their way."""
         with self._lock:
             self._loading += change
+
+
+def stop_words(stops: Sequence[Mapping[str, Any]]) -> str:
+    """Return why all drives brake now; empty where they do not."""
+    if not stops or stops[-1]["resumed"] is not None:
+        return ""
+    cause, since, rested = (stops[-1][key] for key in ("cause", "since", "rested"))
+    rest = "" if rested is None else f"; the team rests since {rested:.2f} s"
+    return f"All drives brake since {since:.2f} s because of {cause}{rest}"
+
+
+def process_row(process: Mapping[str, Any]) -> dict[str, str]:
+    """Return a row of the table of processes: its cells by column."""
+    state, since, age = process["state"], process["missing_since"], process["age"]
+    return {
+        "process": process["name"],
+        "state": state if since is None else f"{state} since {since:.2f} s",
+        "age of answer": "" if age is None or since is not None else f"{1e3 * age:.1f} ms",
+        "messages to the team": f"{process['team_messages']}",
+        "refused": f"{process['refused']}",
+    }
 
 
 def _handler(page: LivePage) -> type[BaseHTTPRequestHandler]:

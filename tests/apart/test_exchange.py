@@ -103,8 +103,9 @@ def test_a_robot_that_is_late_for_a_sample_is_missing_and_the_drives_brake(team,
     team.late = True
     exchange.look(PERIOD, MEASURED)
     assert exchange.missing == {0: 0.0}
-    assert exchange.facts()["processes"][0] == {
-        "name": "robot 0", "state": "silent", "team_messages": 0, "refused": 0,
+    assert exchange.facts()["processes"][0] | {"age": 0.0} == {
+        "name": "robot 0", "state": "silent", "missing_since": 0.0,
+        "team_messages": 0, "refused": 0, "age": 0.0,
     }  # fmt: skip
     exchange.step(PERIOD, MEASURED)
     exchange.look(2 * PERIOD, MEASURED)

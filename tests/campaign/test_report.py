@@ -11,6 +11,7 @@ from scipy.stats import beta, binom
 
 from coop_drake.campaign.records import RunRecord, table_of
 from coop_drake.campaign.report import (
+    distribution,
     headline,
     loss_rate,
     make_report,
@@ -19,6 +20,7 @@ from coop_drake.campaign.report import (
     verdict,
     write_report,
 )
+from coop_drake.campaign.report_figures import distributions_svg
 
 
 def run_table(count=200, scenarios=("base", "tight"), tiers=("drake",), lost=(), seed=1):
@@ -106,7 +108,7 @@ def test_distributions_are_those_of_the_columns(both_tiers):
         times = np.array([row["time"] for row in own if row["arrived"]])
         assert group.measures["funnel_margin"].least == margins.min()
         assert group.measures["time"].median == pytest.approx(np.median(times))
-        assert group.measures["time"].count == times.size
+        assert sum(group.measures["time"].heights) == times.size == group.measures["time"].count
         assert group.rate.lost == sum(not row["arrived"] for row in own)
         assert "budget_share" not in group.measures
     assert {group.reasons for group in both_tiers.groups} == {(), (("left the funnel of the angle", 1),)}
@@ -151,7 +153,8 @@ def test_the_page_stands_alone_and_has_every_section(both_tiers, tmp_path):
     parser.feed(text)
     assert all(link.startswith("#") for link in parser.needed)
     assert "script" not in parser.opened
-    assert parser.opened.count("h2") == 3
+    assert parser.opened.count("svg") == 2
+    assert parser.opened.count("h2") == 4
     assert "a &lt; b" in text
     assert "replay " in text
     read = json.loads(numbers.read_text())
@@ -204,3 +207,27 @@ def test_a_run_that_used_more_than_the_budget_in_both_tiers_counts_once():
 def test_runs_of_the_same_index_in_two_scenarios_are_two_trials():
     table = pa.concat_tables([run_table(10, scenarios=(name,)) for name in ("base", "tight")])
     assert make_report("two", table).rate.runs == 20
+
+
+def table_of_margins(values, margins):
+    """Runs of one scenario with these values of one key and these funnel margins."""
+    records = [
+        RunRecord(k, "base", "drake", k, json.dumps({"mass_error": value}), True, funnel_margin=margin)
+        for k, (value, margin) in enumerate(zip(values, margins, strict=True))
+    ]
+    return table_of(records, RunRecord)
+
+
+@pytest.mark.parametrize("steps", [0, 1, 3, 31, 119])
+def test_values_that_differ_by_rounding_fill_one_bin(steps):
+    value = 0.0123
+    values = np.array([value, value + steps * np.spacing(value), value])
+    found = distribution(values)
+    assert max(found.heights) == sum(found.heights) == 3
+    assert "svg" in distributions_svg(make_report("equal", table_of_margins(values, values)).groups)
+    assert max(distribution(np.array([value, 1.001 * value])).heights) == 1
+
+
+def test_names_with_dollars_are_no_formulas():
+    name = r"cost $\frac$"
+    assert name in distributions_svg(make_report(name, run_table(10, scenarios=(name,))).groups)

@@ -11,7 +11,7 @@ from coop_drake.diagnosis import Answer, diagnose, diagnosing, diagnosis_figure,
 from coop_drake.diagnosis import diagnosing as relaxations
 from coop_drake.diagnosis.contacts import colliding_stretches
 from coop_drake.diagnosis.diagnosing import SLICES, changes, find_passages, try_changes
-from coop_drake.diagnosis.variants import BudgetedPlanner, WidenedFloor
+from coop_drake.diagnosis.variants import BudgetedPlanner, WidenedFloor, on_open_floor
 from coop_drake.drawing import save_figure
 from coop_drake.planning import Channel, find_channel
 from coop_drake.tree.component_tree import Body, Component, ComponentTree, TreeJoint
@@ -138,6 +138,20 @@ def test_two_passages_in_a_row_are_both_named_each_with_what_it_misses():
         assert missing <= 2.0 * passage.enough < missing + 0.02
 
 
+def test_a_team_in_its_own_way_is_told_which_bodies():
+    # A bar of the arm would have to pass through the object, which lies across all of its range.
+    joint = TreeJoint("arm::slide", "prismatic", 0, 0, PlanarPose(), 1.0, (1.0, 0.0), -0.8, 0.8)
+    components = (
+        Component("block", None, None, (Body("block", None, (rectangle(-0.1, 0.1, -0.3, 0.3),)),)),
+        Component("arm", 0, joint, (Body("arm", 0, (rectangle(-0.1, 0.1, -0.05, 0.05),)),)),
+    )
+    start, goal = np.array([0.0, 0.0, 0.0, -0.5]), np.array([0.5, 0.0, 0.0])
+    problem = PlanningProblem(box(-2, -2, 2, 2), ComponentTree(components, frozenset()), start, goal, (0.5,))
+    bare = on_open_floor(problem, BudgetedPlanner(20, 10_000))
+    assert bare.answer is not Answer.FOUND
+    assert bare.pairs == (("block", "arm"),)
+
+
 @pytest.mark.slow
 def test_a_blocked_goal_names_the_body_the_wall_and_the_depth():
     problem = replace(case("base"), goal_pose=np.array([6.2, 4.5, 0.0]))
@@ -162,7 +176,7 @@ def test_an_undecided_question_says_what_remained_mixed(monkeypatch):
     said = " ".join(sentences_of(diagnosis))
     assert "neither free nor blocked" in said
     assert "planner.max_slices" in said
-    assert facts_of(diagnosis)["mixed"][0]["width_fraction"] == diagnosis.mixed[0].width_fraction
+    assert facts_of(diagnosis)["mixed"][0]["share_of_axis"] == diagnosis.mixed[0].width_fraction
 
 
 def test_the_same_diagnosis_has_the_same_picture(rod, tmp_path):

@@ -34,7 +34,7 @@ def test_a_blocked_goal_gets_its_sentences_pictures_and_exit_code_3_and_again(bl
     assert answers[0] == answers[1]
     assert facts["answer"] == "infeasible"
     assert {contact["body"].split("::")[0] for contact in facts["goal"]["contacts"]} == {"robot_0"}
-    assert facts["goal"]["widening"]["found"] > 0.1
+    assert facts["goal"]["walls_moved_back_m"]["found_enough"] > 0.1
     assert facts["diagnosis_cpu_seconds"] > 0.0
     assert facts["sentences"][0] in " ".join(result.stderr.split())
     assert sorted(path.name for path in out.iterdir()) == [".coop_drake_results.json", "why.png", "why.svg"]

@@ -139,8 +139,7 @@ def at_once(gain_sets):
 def searched(try_all=one_by_one, *, runs=60, seed=0, names=("age_phase", "funnel_acceleration")):
     before = bowl(ScheduledGains())
     objective = Objective({"peak_force": 1.0}, (), before.outcome.values)
-    parameters = [one for one in tunable_parameters(before.gains) if not names or one.name in names]
-    return search(before, parameters, objective, try_all, runs=runs, seed=seed)
+    return search(before, tunable_parameters(before.gains, names), objective, try_all, runs=runs, seed=seed)
 
 
 @pytest.mark.parametrize("gain_set", SETS, ids=lambda gains: type(gains).__name__)
@@ -158,6 +157,11 @@ def test_any_three_gains_at_any_bounds_are_a_valid_gain_set(gain_set):
 def test_the_search_begins_where_the_gains_are(gain_set):
     parameters = tunable_parameters(gain_set)
     assert with_fractions(gain_set, parameters, to_fractions(gain_set, parameters)) == gain_set
+
+
+def test_a_gain_that_cannot_be_turned_is_refused():
+    with pytest.raises(TuningError, match="expected one of stiffness, damping"):
+        tunable_parameters(FixedGains(), ["funnel"])
 
 
 @pytest.mark.parametrize("names", [("age_phase", "funnel_acceleration"), ()])
@@ -273,7 +277,7 @@ def called(*arguments):
 
 @pytest.mark.slow
 def test_a_gain_set_comes_out_that_the_scenario_takes(room, tmp_path):
-    result = called(room, "--runs", 2, "--workers", 1, "--out", tmp_path, "--json")
+    result = called(room, "--runs", 2, "--workers", 1, "--vary", "age_phase", "--out", tmp_path, "--json")
     assert result.exit_code == 0, result.output
     facts = json.loads(result.stdout.splitlines()[-1])
     assert facts["trials"] == 2
@@ -302,6 +306,7 @@ def test_ctrl_c_leaves_the_best_so_far(room, tmp_path, monkeypatch):
     [
         (("--criterion", "speed"), "expected one of time"),
         (("--limit", "time<16"), "expected such as"),
+        (("--vary", "funnel"), "expected one of age_phase"),
         (("--gains", "fast"), "or a file with a gain set"),
     ],
 )

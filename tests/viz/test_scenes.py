@@ -25,6 +25,7 @@ from coop_drake.errors import CoopDrakeError
 from coop_drake.plant import build_team_plant
 from coop_drake.scenario import load_scenario
 from coop_drake.viz import LivePage, LiveView, inline_frame, live, recording_html, write_recording
+from coop_drake.viz.live import stop_words
 from coop_drake.viz.recording import kept_frames, page_content, silent_meshcat, with_overlay
 from coop_drake.viz.scene import TeamView, hex_colour, illustrations, paint_robots, set_stage
 from tests.support.cases import case
@@ -117,11 +118,37 @@ def test_a_run_that_is_ahead_of_time_waits(shown, monkeypatch):
 SCENARIO = MODELS / "base.scenario.yaml"
 
 
+PROCESSES = [
+    {
+        "name": "robot 0",
+        "state": "holds",
+        "missing_since": None,
+        "age": 0.0012,
+        "team_messages": 7,
+        "refused": 1,
+    },
+    {
+        "name": "the supervisor",
+        "state": "gone",
+        "missing_since": 2.5,
+        "age": 0.001,
+        "team_messages": 0,
+        "refused": 0,
+    },
+]
+
+
+STOP = {"cause": "robot 1", "since": 2.5, "rested": None, "resumed": None}
+
+
+FACTS = {"processes": PROCESSES, "stops": [STOP | {"resumed": 3.0}, STOP]}
+
+
 @pytest.fixture(scope="module")
 def served():
     meshcat = Meshcat()
     plan = synthetic_plan(case("base"))
-    with LivePage(load_scenario(SCENARIO), plan, meshcat, rate=inf) as page:
+    with LivePage(load_scenario(SCENARIO), plan, meshcat, rate=inf, facts=lambda: FACTS) as page:
         yield page, meshcat
 
 
@@ -152,6 +179,13 @@ def test_it_tells_where_the_run_is_and_how_it_ended(served):
     )
     news = json.loads(got(page, "/news"))
     assert news["details"] == "1.5 s, cell 2 of 5, object at 0.50 m/s"
+    assert [[*row.values()] for row in news["processes"]] == [
+        ["robot 0", "holds", "1.2 ms", "7", "1"],
+        ["the supervisor", "gone since 2.50 s", "", "0", "0"],
+    ]
+    assert news["stop"] == "All drives brake since 2.50 s because of robot 1"
+    assert stop_words([STOP | {"rested": 3.1}]).endswith("because of robot 1; the team rests since 3.10 s")
+    assert stop_words(FACTS["stops"][:1]) == stop_words(()) == ""
     assert not news["verdict"]
     log = synthetic_log(case("base"))
     page.show_verdict(dataclasses.replace(log, reached=False))
