@@ -54,22 +54,15 @@ def _known_path(problem: PlanningProblem, hierarchy: object, known: Any, gap: fl
     return smoothed(problem, known, band.LEAST_CLEARANCE, 0.0, gap, moves=moves)
 
 
-def _same_path(problem: PlanningProblem, path: Any, gap: float) -> Any:
-    """Leave the path as it is."""
-    return path
-
-
 STAGES: dict[str, tuple[Replacement, ...]] = {
     "everything": (),
     "no_candidates": (Replacement(sampled_search, "best_candidate", _known_path),),
     "no_widening": (Replacement(band, "WIDE_MOVES", 0),),
     "no_straightening": (Replacement(band, "STRAIGHTENINGS", ()),),
-    "no_centring": (Replacement(band, "NARROW_REPEATS", 0),),
     "no_improved_path": (
         Replacement(sampled_search, "moved_from_obstacles", lambda problem, path, gap, share: path),
     ),
     "no_covering": (Replacement(cell_selection, "cover_path", lambda *asked: None),),
-    "no_narrow_boxes": (Replacement(cell_selection, "LEVELS", cell_selection.LEVELS[:1]),),
 }
 """For every variant what is replaced; the name says which stage is missing."""
 
