@@ -286,14 +286,6 @@ def test_shares_sum_to_the_command(offsets, com_offset, acceleration, rate, mass
     assert total == pytest.approx(commanded, rel=1e-12, abs=1e-10)
 
 
-@law
-@given(vectors, accelerations, st.floats(-3.0, 3.0))
-def test_every_robot_knows_the_same_object_twist(offset_L, twist, theta):
-    offset = turned(theta, offset_L)
-    at_grasp = np.array([twist[0] - twist[2] * offset[1], twist[1] + twist[2] * offset[0], twist[2]])
-    assert laws.object_twist(*offset, *at_grasp) == pytest.approx(twist, rel=1e-12, abs=1e-12)
-
-
 @pytest.mark.slow
 @settings(max_examples=12)
 @given(st.integers(0, 2**32 - 1))
