@@ -6,11 +6,14 @@ import pytest
 from coop_drake.answers.budget import AxisTracking, Budget
 from coop_drake.laws import measurements
 from coop_drake.laws.robot_dynamics import (
+    VX,
+    VY,
     base_acceleration,
     end_effector_command,
     estimate_object,
     motion_room,
     robot_effort,
+    write_motion,
 )
 from coop_drake.robustness.axis_departure import axis_loop
 from coop_drake.scenario import Deployment, Measurements
@@ -225,6 +228,24 @@ def test_constant_accelerations_are_predicted_exactly(joints):
     ):
         np.testing.assert_allclose(found, x + time * rate + 0.5 * time**2 * a, atol=1e-12)
     np.testing.assert_allclose(predicted[n:], v + time * rows[0, 3:], atol=1e-12)
+
+
+def test_every_robot_knows_the_same_object_twist():
+    """(29), from where the base moves so that its hand does what a point of the object does."""
+    rng = np.random.default_rng(7)
+    for _ in range(20):
+        arm, grasp, theta, twist = random_arm(rng, 0), rng.normal(size=2), rng.normal(), rng.normal(size=3)
+        robot, state, motion = (
+            np.array([0.0, 0.0, rng.normal(), 0.0, 0.0, twist[2]]),
+            np.empty(6),
+            motion_room(arm.chain()),
+        )
+        write_motion(arm.chain(), robot, motion)
+        c, s = np.cos(theta), np.sin(theta)
+        offset = np.array([c * grasp[0] - s * grasp[1], s * grasp[0] + c * grasp[1]])
+        robot[3:5] = twist[:2] + twist[2] * np.array([-offset[1], offset[0]]) - motion[-1, [VX, VY]]
+        estimate_object(arm.chain(), grasp, motion, robot, np.array([0.0, 0.0, theta]), state)
+        np.testing.assert_allclose(state[3:], twist, rtol=1e-12, atol=1e-12)
 
 
 def test_what_is_kept_is_what_was_commanded():

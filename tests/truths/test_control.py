@@ -17,7 +17,6 @@ from tests.support.hand_over import energy_surplus, funnel_surpluses
 from tests.support.point_mass import carry_out, straight_fields
 from tests.support.prescribed import prescribed_acceleration, prescribed_energy
 from tests.support.random_plan import random_plan
-from tests.support.robot_matrices import turned
 
 law = settings(max_examples=200)
 shapes = st.sampled_from(["exponential", "quintic"])
