@@ -37,8 +37,8 @@ READINESS = {"clearance_margin", "interval_margin", "funnel_margin"}
 """Laws of when a cell may be left."""
 
 USERS = {
-    "named": MOTION | READINESS | {"wrench_share", "acceleration_at", "object_twist", "robot_effort"},
-    "compiled": MOTION | READINESS | {"wrench_share", "acceleration_at", "object_twist", "robot_effort"},
+    "named": MOTION | READINESS | {"wrench_share", "acceleration_at", "estimate_object", "robot_effort"},
+    "compiled": MOTION | READINESS | {"wrench_share", "acceleration_at", "estimate_object", "robot_effort"},
     "estimate": MOTION | READINESS,
     "stall": {"energy_margin", "tracking_energy", "axis_bounds", "track_axis"} | READINESS,
 }
