@@ -33,7 +33,7 @@ MOTION = {
 }
 """Laws of how the object and the axes move; planner and loop need them."""
 
-READINESS = {"clearance_margin", "interval_margin", "funnel_margin"}
+READINESS = {"clearance_margin", "interval_margin", "axis_ready"}
 """Laws of when a cell may be left."""
 
 USERS = {
@@ -49,7 +49,7 @@ USERS = {
 def changed():
     """For each law the results that changed with it, computed where laws are plain Python functions."""
     names = [f"coop_drake.{module.replace('/', '.')}:{name}" for module, name in LAWS]
-    names.append("coop_drake.laws.readiness:funnel_margin")
+    names.append("coop_drake.laws.readiness:axis_ready")
     done = subprocess.run(
         [sys.executable, "-m", "tests.support.changed_laws", *names],
         cwd=ROOT, env={**os.environ, "NUMBA_DISABLE_JIT": "1"}, capture_output=True, text=True, check=True,
@@ -58,7 +58,7 @@ def changed():
 
 
 def test_the_table_of_equations_names_the_laws_of_the_loop():
-    assert {name for _, name in LAWS} | {"funnel_margin"} == USERS["named"]
+    assert {name for _, name in LAWS} | {"axis_ready"} == USERS["named"]
 
 
 @pytest.mark.parametrize("user", sorted(USERS))

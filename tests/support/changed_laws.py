@@ -38,12 +38,13 @@ def change(law: FunctionType) -> FunctionType:
             arguments[-1][:] *= 1.1
             return None
         if isinstance(result, tuple):
-            return tuple(1.1 * number for number in result)
+            return tuple(1.1 * number - __shift__ for number in result)  # noqa: F821
         return result - __lowered__  # noqa: F821
 
     # A margin becomes the worst of all, so that nothing hides it; an energy changes a little.
     lowered = 10.0 if law.__module__.endswith("readiness") else 0.5
-    law.__globals__.update(__original__=original, __lowered__=lowered)
+    shift = lowered if law.__module__.endswith("readiness") else 0.0
+    law.__globals__.update(__original__=original, __lowered__=lowered, __shift__=shift)
     law.__code__, law.__defaults__ = changed.__code__, None
     return original
 
