@@ -83,6 +83,7 @@ RUN_KEYS = PLAN_KEYS | {
 RESULTS = [
     ".coop_drake_results.json",
     "log.npz",
+    "maps.json",
     "plan.json",
     "summary.png",
     "table_1.md",
@@ -170,6 +171,7 @@ def test_a_plan_made_before_is_carried_out_with_other_gains(finished, room, tmp_
     assert facts.keys() >= RUN_KEYS
     assert facts["gains"] == "table_2"
     assert facts["maps_read"] == facts["maps"] > 0  # the run before left them in the cache
+    assert (tmp_path / "maps.json").read_bytes() == (out / "maps.json").read_bytes()
     assert not (tmp_path / "plan.json").exists()
     assert [directory for _, directory in drawn] == [tmp_path]
     assert NoDrawings.order == ["recording", "figures"]

@@ -11,7 +11,7 @@ from coop_drake.cli import app
 from coop_drake.cli import results as results_module
 from coop_drake.cli.reporter import Reporter
 from coop_drake.cli.results import ResultFolder
-from coop_drake.cli.task import map_cache, map_cells, read_task
+from coop_drake.cli.task import map_cache, map_cells, read_task, write_accuracies
 from coop_drake.errors import FieldError, ScenarioError
 from tests.support.scenarios import write_scenario
 from tests.support.small_plan import small_plan
@@ -26,7 +26,7 @@ COMMANDS = {
         "fig10_joints_left.png",
         "transport.html",
     ),
-    "simulate": ("log.npz", "fig11_joints_right.png"),
+    "simulate": ("log.npz", "maps.json", "fig11_joints_right.png"),
     "tune": ("plan.json", "gains.yaml", "trials.json"),
     "why": ("why.png", "why.svg"),
     "watch": ("think.html", "think_0001.png"),
@@ -119,13 +119,25 @@ def shown(*arguments):
     return json.loads(result.stdout)
 
 
-def test_accuracies_of_all_cells_are_summed_up(tmp_path):
-    task, reporter = task_with(tmp_path, 1e-9), Reporter(machine=True, quiet=True)
-    accuracies = [one.accuracy for one in map_cells(task, PLAN, reporter, fresh=True)]
-    assert all(0.0 < one.residual <= one.error_estimate <= 1e-9 for one in accuracies)
-    assert reporter.facts["max_map_residual"] == max(one.residual for one in accuracies)
-    assert reporter.facts["max_map_unknowns"] == max(one.unknowns for one in accuracies)
-    assert reporter.facts["mapping_wall_seconds"] >= 0.0
+def test_accuracies_of_all_cells_are_written_and_summed_up(tmp_path):
+    task, reporter, folder = (
+        task_with(tmp_path, 1e-9),
+        Reporter(machine=True, quiet=True),
+        ResultFolder(tmp_path),
+    )
+    maps = map_cells(task, PLAN, reporter, fresh=True)
+    write_accuracies(task, maps, folder)
+    document = json.loads((folder.path / "maps.json").read_text())
+    assert document["tolerance"] == 1e-9
+    rows = document["maps"]
+    assert [row["cell"] for row in rows] == list(range(len(PLAN.cells)))
+    assert all(0.0 < row["residual"] <= row["error_estimate"] <= 1e-9 for row in rows)
+    assert all(
+        row["condition"] > 1.0 and row["unknowns"] > 0 and row["worst_place_description"] for row in rows
+    )
+    assert reporter.facts["max_map_residual"] == max(row["residual"] for row in rows)
+    assert reporter.facts["max_map_unknowns"] == max(row["unknowns"] for row in rows)
+    assert reporter.facts["mapping_wall_seconds"] > 0.0
 
 
 def test_maps_are_kept_unless_fresh_ones_are_asked_for(tmp_path):

@@ -17,6 +17,7 @@ _LARGEST_FRAME = 500
 _FILES = {
     "plan": ("plan.json", "way.json", "certificate.json", "table_1.md"),
     "simulation": (
+        "maps.json",
         "log.npz",
         "transport.html",
         "fig04_start_and_goal.png",

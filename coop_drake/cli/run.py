@@ -31,7 +31,7 @@ from coop_drake.cli.summary import (
     simulation_facts,
     summary_rows,
 )
-from coop_drake.cli.task import Task, map_cells, read_task
+from coop_drake.cli.task import Task, map_cells, read_task, write_accuracies
 from coop_drake.viz.drawing_processes import DrawingProcesses
 
 if TYPE_CHECKING:
@@ -121,7 +121,7 @@ def carry_out(
 ) -> ExitCode:
     """Simulate a plan and record it; a violated invariant or a goal not reached is a failed run.
 
-    Log, recording and figures go to the folder; the page of a live view shows the run,
+    Log, accuracies of maps, recording and figures go to the folder; the page of a live view shows the run,
     then the recording.
     """
     with _live_page(task, plan, reporter, options) as page:
@@ -130,7 +130,7 @@ def carry_out(
         log = _simulate(task, plan, maps, reporter, simulation, page)
         if page:
             page.show_verdict(log)
-        _record(task, log, folder, reporter, drawing, page)
+        _record(task, maps, log, folder, reporter, drawing, page)
     if log.violation:
         reporter.complain(log.violation)
     elif not log.reached:
@@ -142,15 +142,17 @@ def carry_out(
 
 def _record(
     task: Task,
+    maps: tuple[HarmonicMap, ...],
     log: SimulationLog,
     folder: ResultFolder,
     reporter: Reporter,
     drawing: DrawingProcesses,
     page: LivePage | None,
 ) -> None:
-    """Write log, recording and figures of a run, and show its closing table."""
+    """Write log, accuracies, recording and figures of a run, and show its closing table."""
     folder.begin("simulation", robots=log.robot_names)
     drawing.draw(log, folder.path)
+    write_accuracies(task, maps, folder)
     log.save(folder.path / "log.npz")
     with reporter.stage("recording", "drawing"):
         drawing.wait("recording")

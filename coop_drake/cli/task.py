@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -14,6 +15,7 @@ if TYPE_CHECKING:
 
     from coop_drake.answers import Plan, PlanningProblem
     from coop_drake.cli.reporter import Reporter
+    from coop_drake.cli.results import ResultFolder
     from coop_drake.harmonic_maps import HarmonicMap, MapStore
     from coop_drake.scenario import Scenario
 
@@ -87,3 +89,12 @@ def map_cells(task: Task, plan: Plan, reporter: Reporter, *, fresh: bool = False
             raise FieldError(f"{error} ({task.scenario.path}: maps.tolerance is {tolerance:g})") from error
     reporter.facts.update(map_facts(maps), maps_read=0 if store is None else store.found)
     return maps
+
+
+def write_accuracies(task: Task, maps: tuple[HarmonicMap, ...], folder: ResultFolder) -> None:
+    """Write the estimated accuracy of every map as ``maps.json``."""
+    from coop_drake.files import write_atomically
+    from coop_drake.simulation import accuracy_rows
+
+    document = {"tolerance": task.scenario.maps.tolerance, "maps": accuracy_rows(maps)}
+    write_atomically(folder.path / "maps.json", json.dumps(document, indent=1).encode() + b"\n")

@@ -1,5 +1,5 @@
 from .clearance import Clearance, TeamClearance
-from .maps import build_maps
+from .maps import accuracy_rows, build_maps
 from .run import configure_simulator, run_loop, simulate
 from .telemetry import (
     ACCELERATION_TOLERANCE,
@@ -20,6 +20,7 @@ __all__ = [
     "MessageStatistics",
     "Sample",
     "TeamClearance",
+    "accuracy_rows",
     "build_maps",
     "communication",
     "configure_simulator",

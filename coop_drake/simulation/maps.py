@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from typing import Any
 
 from shapely import Point
 from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
@@ -62,3 +63,12 @@ def build_maps(
     if store is not None and store.found < count:
         store.trim()
     return tuple(maps)
+
+
+def accuracy_rows(maps: Sequence[HarmonicMap]) -> list[dict[str, Any]]:
+    """Return the accuracy of maps as plain values by the names of `MapAccuracy`, cells from 0."""
+    rows = []
+    for cell, harmonic_map in enumerate(maps):
+        vertices = len(harmonic_map.solution.arrays.edges)
+        rows.append({"cell": cell, "vertices": vertices, **harmonic_map.accuracy.plain()})
+    return rows
