@@ -121,7 +121,7 @@ class BudgetedPlanner:
 
     def _asked(self, variant: PlanningProblem, samples: SampledSearch, proofs: Proofs, stage: str) -> Outcome:
         for _ in range(PATHS):
-            (found,) = samples.attempts(1)
+            (found,) = samples.attempts(1, progress=lambda _: self._report(stage))
             if found is not None:
                 path = densified(found.path, configuration_scale(variant.tree), STEP)
                 return Outcome(variant, Answer.FOUND, path)

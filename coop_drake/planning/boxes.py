@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from math import hypot
 from typing import NamedTuple
 
@@ -429,6 +429,7 @@ class Certifier:
     def boxes(
         self,
         path: FloatArray,
+        progress: Callable[[float], None] | None = None,
         *,
         longest: bool = False,
         smallest: bool = False,
@@ -437,6 +438,7 @@ class Certifier:
 
         Args:
             path: Configurations with circular axes unwrapped, the first one free, shape (m, 3 + n).
+            progress: Called with the fraction of the path that is covered.
             longest: Whether to take the longest boxes, instead of those with the highest average speed.
             smallest: Whether boxes may be as small as a passage of a millimetre needs; a transport through
                 them takes long.
@@ -458,6 +460,8 @@ class Certifier:
                 continue
             i, box = found
             boxes.append(box)
+            if progress is not None:
+                progress(i / (len(samples) - 1))
         return boxes
 
     def _next_box(

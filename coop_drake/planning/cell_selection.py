@@ -40,6 +40,7 @@ from coop_drake.planning.transitions import (
     turned_to_start,
     with_gains,
 )
+from coop_drake.progress import Progress
 from coop_drake.tree.component_tree import nearest_turn, usual_unit
 from coop_drake.tree.pose import FloatArray, IntArray
 
@@ -51,6 +52,7 @@ def quickest_plan(
     *,
     gain_set_name: str,
     least_overlap: float = 0.0,
+    progress: Progress | None = None,
 ) -> Plan:
     """Make a plan along the path of a search's result, with other boxes if these can be found.
 
@@ -65,6 +67,7 @@ def quickest_plan(
         gain_set: Gains, fixed or to be scheduled.
         gain_set_name: Name under which the scenario knows them.
         least_overlap: Least overlap of consecutive boxes in every angle and joint [rad or m].
+        progress: Called with a phase and the fraction of it that is done.
 
     Raises:
         GeometryError: If the boxes that the search found are needed and their polygons cannot be made.
@@ -74,7 +77,7 @@ def quickest_plan(
     """
     unit = usual_unit(problem.tree)
     if unit == 1.0:
-        return _quickest(problem, found, gain_set, gain_set_name, least_overlap)
+        return _quickest(problem, found, gain_set, gain_set_name, least_overlap, progress)
     scale = Rescaling(problem, unit)
     try:
         made = _quickest(
@@ -83,6 +86,7 @@ def quickest_plan(
             scale.gains(gain_set),
             gain_set_name,
             least_overlap,
+            progress,
         )
     except TooQuickError:
         raise
@@ -99,11 +103,14 @@ def _quickest(
     gain_set: GainSet,
     gain_set_name: str,
     least_overlap: float,
+    progress: Progress | None,
 ) -> Plan:
     if isinstance(found, Channel):
         found = turned_to_start(problem, found)
         check_ends(problem, found)
     path = found.path if found.path is not None else path_through(problem, found)
+    if progress is not None:
+        progress("choosing boxes", 0.0)
 
     def covered(limits: FloatArray | None = None) -> Plan | None:
         better = cover_path(problem, path, found.margin, gain_set, least_overlap, limits)
@@ -111,7 +118,9 @@ def _quickest(
             return None
         try:
             channel, targets = better
-            return make_plan(problem, channel, gain_set, gain_set_name=gain_set_name, targets=targets)
+            return make_plan(
+                problem, channel, gain_set, gain_set_name=gain_set_name, targets=targets, progress=progress
+            )
         except TooQuickError:  # other boxes would not be slower
             raise
         except (GeometryError, PlanError, StallError, ShapelyError):
@@ -123,7 +132,7 @@ def _quickest(
         slower = covered(limits_of(plan)) if _is_slowed(plan) else None
         return plan if slower is None or plan_time(plan) <= plan_time(slower) else slower
     channel = found if isinstance(found, Channel) else found.channel()
-    return make_plan(problem, channel, gain_set, gain_set_name=gain_set_name)
+    return make_plan(problem, channel, gain_set, gain_set_name=gain_set_name, progress=progress)
 
 
 def _is_slowed(plan: Plan) -> bool:

@@ -122,10 +122,7 @@ def _answer(
         way, asked = answer, ended(question, answer)
         make = partial(_made, asked, gain_set, gain_set_name, budget)
         try:
-            if progress is not None:
-                with suppress(PatienceError):  # a plan is made of the way all the same
-                    progress("choosing boxes", 0.0)
-            made = make(answer)
+            made = _finished(partial(make, answer), progress)
         except (GeometryError, PlanError, StallError, ShapelyError) as error:
             stall = f"a free path exists, but a plan along it cannot be executed: {error}"
             too_quick = isinstance(error, TooQuickError)
@@ -199,27 +196,42 @@ def _turned(goal: float, near: float) -> float:
     return near if abs(away) <= SAME_END else near + away
 
 
+def _finished(
+    make: Callable[[Progress | None], Plan | BeyondBudget], progress: Progress | None
+) -> Plan | BeyondBudget:
+    """Make a plan along a certified way, and finish it although ``progress`` has lost its patience."""
+    try:
+        return make(progress)
+    except PatienceError:
+        return make(None)
+
+
 def _made(
     problem: PlanningProblem,
     gain_set: GainSet,
     name: str,
     budget: Budget | None,
     found: Channel | CoveredPath,
+    progress: Progress | None = None,
 ) -> Plan | BeyondBudget:
     if budget is None:
-        return _slow_enough(problem, found, gain_set, name)
+        return _slow_enough(problem, found, gain_set, name, progress)
     if not isinstance(gain_set, ScheduledGains):
         raise ValueError(f"a budget needs scheduled gains; the gain set {name!r} is fixed")
     from coop_drake.planning.budget.tolerant import tolerant_plan  # Here: it imports scipy.
 
-    made = tolerant_plan(problem, found, gain_set, gain_set_name=name, budget=budget)
+    made = tolerant_plan(problem, found, gain_set, gain_set_name=name, budget=budget, progress=progress)
     if isinstance(made, Plan) and (broken := refusals(problem, made)):
         raise StallError("under the budget, " + "; ".join(refusal.describe() for refusal in broken))
     return made
 
 
 def _slow_enough(
-    problem: PlanningProblem, found: Channel | CoveredPath, gain_set: GainSet, name: str
+    problem: PlanningProblem,
+    found: Channel | CoveredPath,
+    gain_set: GainSet,
+    name: str,
+    progress: Progress | None,
 ) -> Plan:
     """The plan with the quickest gains for which no limit of acceleration acts."""
     last = 1.0
@@ -227,10 +239,10 @@ def _slow_enough(
         for factor in AGE_FACTORS[:-1]:
             with suppress(TooQuickError):
                 gains = gain_set.slowed(factor)
-                made = quickest_plan(problem, found, gains, gain_set_name=name)
+                made = quickest_plan(problem, found, gains, gain_set_name=name, progress=progress)
                 return replace(made, age_factor=factor)
         last, gain_set = AGE_FACTORS[-1], gain_set.slowed(AGE_FACTORS[-1])
-    made = quickest_plan(problem, found, gain_set, gain_set_name=name)
+    made = quickest_plan(problem, found, gain_set, gain_set_name=name, progress=progress)
     return replace(made, age_factor=last)
 
 

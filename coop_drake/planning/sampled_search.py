@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from functools import partial
@@ -117,11 +117,17 @@ class SampledSearch:
         self.slices = 0
         self.object_blocked = 0
 
-    def attempts(self, number: int, part: tuple[int, ...] | None = None) -> Iterator[CoveredPath | None]:
+    def attempts(
+        self,
+        number: int,
+        progress: Callable[[float], None] | None = None,
+        part: tuple[int, ...] | None = None,
+    ) -> Iterator[CoveredPath | None]:
         """Sample some paths and cover each of them at margin zero, all with other samples.
 
         Args:
             number: How many.
+            progress: Called with the fraction of an attempt that is done.
             part: Robots for which, with the object alone, a path seems hard to find: it is sampled first.
 
         Yields:
@@ -131,7 +137,7 @@ class SampledSearch:
             found, self._attempts = None, self._attempts + 1
             with suppress(GeometryError, ShapelyError):
                 if self._start_inside:
-                    found, blocked = self._attempt(self._attempts, part=part)
+                    found, blocked = self._attempt(self._attempts, progress, part=part)
                     self.object_blocked = self.object_blocked + 1 if blocked else 0
             yield found
 
@@ -148,7 +154,7 @@ class SampledSearch:
             return None
         for number in range(LIGHT_ATTEMPTS + 1, LIGHT_ATTEMPTS + 1 + len(CLEARANCES)):
             with suppress(GeometryError, ShapelyError):
-                found, _ = self._attempt(number, guide)
+                found, _ = self._attempt(number, None, guide)
                 if found is not None:
                     return found
         return None
@@ -156,13 +162,14 @@ class SampledSearch:
     def _attempt(
         self,
         number: int,
+        progress: Callable[[float], None] | None,
         guide: FloatArray | None = None,
         part: tuple[int, ...] | None = None,
     ) -> tuple[CoveredPath | None, bool]:
         """The boxes along a sampled path, if any, and whether no path was found even for the object alone."""
         clearance, gap = CLEARANCES[(number - 1) % len(CLEARANCES)]
         workspace = marginal_workspace(self._problem, clearance)
-        sampler = Sampler(self._hierarchy, workspace, gap, number - 1)
+        sampler = Sampler(self._hierarchy, workspace, gap, number - 1, progress)
         direct = number > 1 or len(self._problem.goal_joints) > FEW_JOINTS
         samples = samples_of_attempt(number)
         if guide is None:
@@ -181,7 +188,13 @@ class SampledSearch:
                 break
         return found, sampler.object_blocked
 
-    def narrow_attempt(self, number: int, *, object_first: bool = False) -> CoveredPath | None:
+    def narrow_attempt(
+        self,
+        number: int,
+        progress: Callable[[float], None] | None = None,
+        *,
+        object_first: bool = False,
+    ) -> CoveredPath | None:
         """Look for a path through passages that are too narrow for samples, and cover it at margin zero.
 
         Paths are first sought on floors that are larger, and repaired until they fit the floor. The best of
@@ -190,6 +203,7 @@ class SampledSearch:
 
         Args:
             number: How many such attempts there were before; each has other random numbers.
+            progress: Called with the fraction of a path that is done.
             object_first: Whether, but in the first attempt, a path of the object alone is to be found and
                 repaired before one of the team. This is not done for parts of the team with robots: their
                 paths are repaired to other places than the team's, and ways were lost by it.
@@ -202,7 +216,7 @@ class SampledSearch:
         fitting = list[tuple[float, FloatArray]]()
         with suppress(GeometryError, ShapelyError):
             for seed, growth in ways if self._start_inside else ():
-                path = self._on_larger_floor(number > 0, object_first, seed, growth)
+                path = self._on_larger_floor(number > 0, object_first, seed, growth, progress)
                 if not len(path):
                     continue
                 path, short = repaired(self._problem, path, growth)
@@ -224,6 +238,7 @@ class SampledSearch:
         object_first: bool,
         seed: int,
         growth: float,
+        progress: Callable[[float], None] | None,
     ) -> FloatArray:
         """Sample a path with walls moved back; no rows if none is found.
 
@@ -231,7 +246,7 @@ class SampledSearch:
         go where the object alone goes most easily.
         """
         floor = widened_floor(self._problem.workspace, growth)
-        sampler = Sampler(self._hierarchy, floor, BODY_GAP, seed)
+        sampler = Sampler(self._hierarchy, floor, BODY_GAP, seed, progress)
         if not direct:
             return sampler.path(NARROW_SAMPLES)
         if not object_first:
@@ -244,18 +259,22 @@ class SampledSearch:
             return np.empty((0, len(self._problem.start)))
         return sampler.path_around(GuidePath(path, guide.joints), NARROW_SAMPLES)
 
-    def with_margin(self, first: CoveredPath, share: float = 1.0) -> CoveredPath:
+    def with_margin(
+        self, first: CoveredPath, progress: Callable[[float, float], None], share: float = 1.0
+    ) -> CoveredPath:
         """Move the best path away from the walls, and cover it at the largest margin that it keeps.
 
         Args:
             first: Boxes at margin zero.
             share: Share of the usual work that is spent on the path [-].
+            progress: Called with a margin [m] and the fraction of the path that is covered.
 
         Returns:
             Boxes at a margin; at margin zero if no other margin is kept.
         """
+        progress(0.0, 0.0)
         near = best_candidate(self._problem, self._hierarchy, first.path, BODY_GAP, share)
-        return self._moved(near, share) or self._covered(first.path, 0.0) or first
+        return self._moved(near, share, progress) or self._covered(first.path, 0.0) or first
 
     def another(self, number: int, share: float) -> CoveredPath | None:
         """Find another path by other samples; see ``CoveredPath``."""
@@ -265,12 +284,16 @@ class SampledSearch:
         except (GeometryError, ShapelyError):
             return None
 
-    def _moved(self, near: FloatArray, share: float) -> CoveredPath | None:
+    def _moved(
+        self, near: FloatArray, share: float, progress: Callable[[float, float], None] | None = None
+    ) -> CoveredPath | None:
         """Move a path away from the walls, and cover it at the largest margin that it keeps."""
         path = moved_from_obstacles(self._problem, near, BODY_GAP, share)
         for margin in margins_to_try(self._problem, path):
+            if progress is not None:
+                progress(margin, 0.0)
             try:
-                found = self._covered(path, margin)
+                found = self._covered(path, margin, progress)
             except (GeometryError, ShapelyError):
                 found = None
             if found is not None:
@@ -281,6 +304,7 @@ class SampledSearch:
         self,
         path: FloatArray,
         margin: float,
+        progress: Callable[[float, float], None] | None = None,
         *,
         longest: bool = False,
         smallest: bool = False,
@@ -288,7 +312,8 @@ class SampledSearch:
         """Cover a path with boxes that keep a margin."""
         workspace = marginal_workspace(self._problem, margin)
         certifier = Certifier(self._swept, self._pairs, workspace, self._scale, margin)
-        boxes = certifier.boxes(path, longest=longest, smallest=smallest)
+        report = None if progress is None else (lambda fraction: progress(margin, fraction))
+        boxes = certifier.boxes(path, report, longest=longest, smallest=smallest)
         self.slices += certifier.trials
         if boxes is None:
             return None

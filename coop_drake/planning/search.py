@@ -11,6 +11,7 @@ A sampled path is then moved away from the walls and covered again at the larges
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
 from functools import cached_property
@@ -224,14 +225,14 @@ class _Search:
 
     def _sampled(self, attempts: int, part: tuple[int, ...] | None = None) -> CoveredPath | None:
         """Sample paths, of a part of the team first, and cover them; fewer times if the object is blocked."""
-        self._tell("sampling paths")
-        for found in self._samples.attempts(attempts, part):
+        report = self._phase("sampling paths")
+        report(0.0)
+        for found in self._samples.attempts(attempts, report, part):
             if found is not None:
                 self._first_plan = thread_time() - self._began
                 return found
             if self._samples.object_blocked == ENOUGH_BLOCKED_ATTEMPTS:
                 return None
-            self._tell("sampling paths")
         return None
 
     def _narrow(self, slices: int, object_blocked: bool) -> CoveredPath | None:
@@ -242,9 +243,8 @@ class _Search:
 
     def _narrow_sampled(self) -> CoveredPath | None:
         """Sample paths through narrow passages, other ones each time."""
-        self._tell("sampling narrow passages")
-        first = self._proofs.blocked_part == ()
-        found = self._samples.narrow_attempt(self._narrow_attempts, object_first=first)
+        phase, first = self._phase("sampling narrow passages"), self._proofs.blocked_part == ()
+        found = self._samples.narrow_attempt(self._narrow_attempts, phase, object_first=first)
         self._narrow_attempts += 1
         if found is not None:
             self._first_plan = thread_time() - self._began
@@ -258,20 +258,20 @@ class _Search:
         return channel
 
     def _explored(self, slices: int, robots: int | None = None, *, untested: bool = True) -> Verdict:
+        report = self._phase("exploring slices")
         most = self._problem.settings.max_slices
-
-        def report(count: int) -> None:
-            self._tell("exploring slices", count / most)
-
-        verdict = self._proofs.run(slices, robots, report, untested=untested)
+        verdict = self._proofs.run(slices, robots, lambda count: report(count / most), untested=untested)
         self._explored_slices = self._proofs.slices
         return verdict
 
     def _with_margin(self, found: CoveredPath) -> CoveredPath:
         """The path at the largest margin that is found."""
+
+        def report(margin: float, fraction: float) -> None:
+            self._phase(f"searching at margin {self._unit * margin:.3f} m")(fraction)
+
         try:
-            self._tell("moving away from walls")
-            best = self._samples.with_margin(found, min(1.0, self._problem.settings.effort))
+            best = self._samples.with_margin(found, report, min(1.0, self._problem.settings.effort))
         except (GeometryError, ShapelyError, PatienceError):
             return found
 
@@ -295,10 +295,10 @@ class _Search:
     def _slices(self) -> int:
         return self._other_slices + self._samples.slices + self._explored_slices
 
-    def _tell(self, phase: str, fraction: float = 0.0) -> None:
-        """Report the fraction of a phase that is done."""
-        if self._progress is not None:
-            self._progress(phase, fraction)
+    def _phase(self, name: str) -> Callable[[float], None]:
+        """A function that reports the fraction of a phase that is done."""
+        progress = self._progress
+        return (lambda fraction: None) if progress is None else (lambda fraction: progress(name, fraction))
 
 
 # Search by cells alone, without samples: with our order of splits, or as the paper prints it.

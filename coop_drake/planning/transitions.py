@@ -30,6 +30,7 @@ from coop_drake.planning.limits import (
     speed_shares,
     stated_speeds,
 )
+from coop_drake.progress import Progress
 from coop_drake.tree.component_tree import nearest_turn
 from coop_drake.tree.pose import FloatArray
 
@@ -177,6 +178,7 @@ def make_plan(
     *,
     gain_set_name: str,
     targets: Sequence[FloatArray] | None = None,
+    progress: Progress | None = None,
 ) -> Plan:
     """Make a plan of a channel.
 
@@ -186,6 +188,7 @@ def make_plan(
         gain_set: Gains, fixed or to be scheduled.
         gain_set_name: Name under which the scenario knows them.
         targets: Points at which each box is left, the last one the goal; by default as ``exits`` has them.
+        progress: Called with a phase and the fraction of it that is done.
 
     Raises:
         PlanError: If the channel does not join the start to the goal.
@@ -197,8 +200,11 @@ def make_plan(
     if targets is None:
         targets = (*exits(channel), goal)
     entries = (start, *targets[:-1])
-    boxes = enumerate(zip(channel.boxes, entries, targets, strict=True))
-    cells = [_cell(box, entry, target, index) for index, (box, entry, target) in boxes]
+    cells = []
+    for index, (box, entry, target) in enumerate(zip(channel.boxes, entries, targets, strict=True)):
+        cells.append(_cell(box, entry, target, index))
+        if progress is not None:
+            progress("tidying", (index + 1) / len(targets))
     routes, transitions, resting = [], [], problem.start[2:]
     for index, (entry, target) in enumerate(zip(entries, targets, strict=True)):
         goals = goal_intervals(problem, channel, index)

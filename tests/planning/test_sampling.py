@@ -468,7 +468,7 @@ def test_paths_on_larger_floors_are_sampled_robot_by_robot_first_then_at_once_or
     problem, asked, nothing = corridor_problem(0.9), [], np.empty((0, 5))
 
     class Recorded:
-        def __init__(self, hierarchy, floor, gap, seed):
+        def __init__(self, hierarchy, floor, gap, seed, progress):
             self.steps, size = [], floor.area - problem.workspace.area
             asked.append((seed, gap, size, self.steps))
 

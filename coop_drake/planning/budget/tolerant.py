@@ -29,6 +29,7 @@ from coop_drake.planning.budget.position_fit import (
 from coop_drake.planning.cell_selection import quickest_plan
 from coop_drake.planning.channel import Channel, CoveredPath
 from coop_drake.planning.duration import plan_time
+from coop_drake.progress import Progress
 from coop_drake.robustness.alarms import rubbed
 from coop_drake.robustness.couplings import QUICKEST, TeamCouplings, friction_pushes, team_couplings
 from coop_drake.robustness.position import position_may_rest
@@ -78,6 +79,7 @@ def tolerant_plan(
     *,
     gain_set_name: str,
     budget: Budget,
+    progress: Progress | None = None,
 ) -> Plan | BeyondBudget:
     """Make a plan along a path that a search found, with boxes and gains for which a budget holds.
 
@@ -87,6 +89,7 @@ def tolerant_plan(
         gain_set: The rule of the gains.
         gain_set_name: Name under which the scenario knows it.
         budget: The departures to be tolerated.
+        progress: Called with a phase and the fraction of it that is done.
 
     Raises:
         GeometryError: As ``quickest_plan`` raises it; so are the others.
@@ -94,7 +97,7 @@ def tolerant_plan(
         StallError: No plan can be executed.
     """
     tried: list[_Tried] = []
-    plans = _plans(problem, found, gain_set, gain_set_name, budget)
+    plans = _plans(problem, found, gain_set, gain_set_name, budget, progress)
     for plan in plans:
         fitted = _fitted(problem, plan, gain_set, budget, team_couplings(budget, problem.tree, plan.cells))
         if isinstance(fitted, Plan):
@@ -111,12 +114,16 @@ def _plans(
     gain_set: ScheduledGains,
     gain_set_name: str,
     budget: Budget,
+    progress: Progress | None,
 ) -> Iterator[Plan]:
     """Make a plan for every least overlap with which one can be made; the first one must be."""
     count = 0
     for overlap in OVERLAPS if budget.axes else (0.0,):  # the position alone asks for none
         try:
-            plan = quickest_plan(problem, found, gain_set, gain_set_name=gain_set_name, least_overlap=overlap)
+            plan = quickest_plan(
+                problem, found, gain_set, gain_set_name=gain_set_name, least_overlap=overlap,
+                progress=progress,
+            )  # fmt: skip
         except (GeometryError, PlanError, StallError, ShapelyError):
             if count == 0:
                 raise

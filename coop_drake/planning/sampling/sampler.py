@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -168,6 +169,7 @@ class Sampler:
         workspace: Floor with the wanted clearance taken off [m].
         gap: Distance that two bodies keep, unless they are nearer at the start or the goal [m].
         seed: Seed of the samples.
+        progress: Called with the fraction of the subsystems that are done.
 
     Attributes:
         object_blocked: Whether no path was found even for the object alone.
@@ -179,11 +181,13 @@ class Sampler:
         workspace: MultiPolygon,
         gap: float,
         seed: int,
+        progress: Callable[[float], None] | None = None,
     ) -> None:
         self._hierarchy, self._gap = hierarchy, hierarchy.gap_at_ends(gap)
         self._grid: ObstacleGrid = grid_for_team(workspace, hierarchy.subsystem(hierarchy.robots).team)
         self._bounds = workspace.bounds
         self._random = np.random.default_rng(seed)
+        self._progress = progress
         self.object_blocked = False
 
     def path(self, samples: int, choices: int = 1) -> FloatArray:
@@ -203,12 +207,15 @@ class Sampler:
             found.
         """
         robots, subsystem = self._hierarchy.robots, self._hierarchy.subsystem
+        steps = 2 + 2 * len(robots)
         disc = self._disc_path(samples)
+        self._report(1 / steps)
         found = (self._guide(subsystem(()), disc, samples)[0] for _ in range(choices))
         best = min((guide for guide in found if guide is not None), key=_least_duration, default=None)
         self.object_blocked = best is None
         alone: list[tuple[int, int, GuidePath]] = []
         for robot in robots if best is not None else ():
+            self._report((2 + len(alone)) / steps)
             guide, effort = self._guide(subsystem((robot,)), best, samples)
             if guide is None:
                 guide, more = self._guide(subsystem((robot,)), disc, samples)
@@ -220,6 +227,7 @@ class Sampler:
         added: tuple[int, ...] = ()
         for _, robot, guide in alone:
             added = tuple(sorted((*added, robot)))
+            self._report((1 + len(robots) + len(added)) / steps)
             best = guide if len(added) == 1 else self._guide(subsystem(added), best, samples)[0]
             if best is None:
                 return _NO_PATH
@@ -263,6 +271,7 @@ class Sampler:
         """
         chosen, disc = self._hierarchy.subsystem(robots), self._disc_path(samples)
         found = None if disc is None else self._guide(chosen, disc, samples, WHERE_TREES_END)[0]
+        self._report(0.5)
         if found is None and robots:
             alone, _ = self._guide(self._hierarchy.subsystem(()), disc, samples, WHERE_TREES_END)
             self.object_blocked = alone is None
@@ -373,6 +382,10 @@ class Sampler:
             subsystem.team, self._grid, path, subsystem.scale, self._gap, COLLISION_STEP, uniforms
         )
         return better
+
+    def _report(self, fraction: float) -> None:
+        if self._progress is not None:
+            self._progress(fraction)
 
 
 def _least_duration(guide: GuidePath) -> float:
