@@ -169,7 +169,7 @@ def broken_text(
 
 def yaml_mutants(data: dict[str, Any], seed: int) -> Iterator[Mutant]:
     """Broken YAML of a scenario, and YAML without end: repeated keys, code, nesting, aliases of aliases."""
-    text = block(data)
+    text = block({key: value for key, value in data.items() if key != "planner"})  # the mutants' own section
     yield from broken_text(text.encode(), 50, seed, end=text.index("goal:"))
     for kind, content in (
         ("a repeated key", text + '"goal": 3\n'),

@@ -2,35 +2,39 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
 import pytest
 import shapely
-from hypothesis import HealthCheck, assume, given, settings
+from hypothesis import HealthCheck, Phase, assume, given, settings
 from hypothesis import strategies as st
 from pydrake.math import RigidTransform, RotationMatrix
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from shapely import Point, Polygon
 from shapely.affinity import rotate
+from shapely.geometry.base import BaseGeometry
 
 from coop_drake.answers.problem import PlannerSettings, PlanningProblem
 from coop_drake.planning.cells.exploration import Exploration, Verdict
 from coop_drake.planning.cells.graph import Kind
 from coop_drake.planning.channel import Channel
+from coop_drake.planning.proofs import blocked_goal
 from coop_drake.planning.questions import relaxed
+from coop_drake.planning.sampling.collision import densified
 from coop_drake.planning.search import find_channel
 from coop_drake.plant.chain import planar_pose
 from coop_drake.tree import component_tree
 from coop_drake.verification.answer import same_angle
-from tests.support.cases import case
+from tests.support.cases import case, team_tree
 from tests.support.free_positions import FreePositions, wall_edges
 from tests.support.moved import Similarity
 from tests.support.passages import DiscDoor, FoldingArm, LadderCorner, RodCorridor
 from tests.support.shapes import floors
 from tests.support.soundness import assert_channel_is_sound
+from tests.support.trees import placed_shape, trees
 
 PASSAGES = (DiscDoor(), RodCorridor(), LadderCorner(), FoldingArm())
 NAMES = [type(passage).__name__ for passage in PASSAGES]
@@ -124,6 +128,45 @@ def test_every_part_takes_angles_apart_by_whole_turns_for_one(angle: float, turn
     )
 
 
+@settings(max_examples=20)
+@given(SIMILARITIES, st.booleans())
+def test_a_moved_team_stands_where_its_image_stands(similarity: Similarity, sliding: bool) -> None:
+    """The images of all corners are the corners of the image: that the question is moved as it should be."""
+    problem = FoldingArm().problem(0.4)
+    tree = team_tree(2, 2)
+    if sliding:
+        components = tuple(
+            component if component.joint is None else replace(component, joint=_sliding(component.joint))
+            for component in tree.components
+        )
+        tree = replace(tree, components=components)
+    z = np.array([1.0, 2.0, 0.5, 0.1, -0.2, 0.3, 0.4])
+    problem = replace(problem, tree=tree, start=z, goal_pose=z[:3], goal_joints=(None,) * 4)
+    image = similarity.question(problem)
+    corner = _corners(problem) * np.array([1.0, similarity.sign]) * similarity.scale
+    c, s = np.cos(similarity.angle), np.sin(similarity.angle)
+    expected = corner @ np.array([[c, s], [-s, c]]) + similarity.shift
+    found = _corners(image)
+    gaps = np.abs(expected[:, None, :] - found[None, :, :]).max(axis=2)
+    assert max(gaps.min(axis=0).max(), gaps.min(axis=1).max()) < 1e-9 * (1e4 + similarity.scale)
+
+
+def _sliding(joint: component_tree.TreeJoint) -> component_tree.TreeJoint:
+    return replace(joint, kind="prismatic", axis=(0.6, 0.8))
+
+
+def _corners(problem: PlanningProblem) -> np.ndarray:
+    poses = problem.tree.poses(problem.start)
+    return np.concatenate(
+        [
+            X_WC.apply(shape.vertices)
+            for X_WC, component in zip(poses, problem.tree.components, strict=True)
+            for body in component.bodies
+            for shape in body.shapes
+        ]
+    )
+
+
 def is_joined(
     floor: Polygon, body: Polygon, start: np.ndarray, goal: np.ndarray, layers: int, hair: float
 ) -> bool:
@@ -207,7 +250,81 @@ def free_pose(tree: component_tree.ComponentTree, floor: Polygon, random: np.ran
     raise AssertionError
 
 
+_STEP = 0.04
+
+
+@dataclass(frozen=True)
+class Planted:
+    """A question and configurations on a way that answers it, start and goal too, shape (m, 3 + n)."""
+
+    problem: PlanningProblem
+    path: np.ndarray
+
+
+@st.composite
+def planted(draw: st.DrawFn, robots: tuple[int, int] = (1, 3), joints: tuple[int, int] = (1, 2)) -> Planted:
+    """A random team, a random path of two or three legs, and the floor that it needs, little more."""
+    tree = draw(trees(robots, joints))
+    random = np.random.default_rng(draw(st.integers(0, 1_000_000)))
+    room = draw(st.sampled_from((0.03, 0.06, 0.15)))
+    path = densified(
+        _stops(tree, random, draw(st.integers(2, 3))), component_tree.configuration_scale(tree), _STEP
+    )
+    floor = shapely.union_all(_pieces(tree, path)).buffer(room, quad_segs=2)
+    floor = floor.simplify(0.4 * room)
+    assume(isinstance(floor, Polygon))
+    assert isinstance(floor, Polygon)
+    path = np.concatenate((path[:-1:3], path[-1:]))
+    assume(all(FreePositions(tree, floor, z[2:]).free(z[None, :2])[0] for z in path))
+    fixed = random.random(len(tree.joints)) < 0.5
+    goal = path[-1]
+    problem = PlanningProblem(
+        workspace=floor,
+        tree=tree,
+        start=path[0],
+        goal_pose=goal[:3],
+        goal_joints=tuple(float(q) if keep else None for q, keep in zip(goal[3:], fixed, strict=True)),
+        settings=PlannerSettings(margin=0.02, max_slices=300),
+    )
+    return Planted(problem, path)
+
+
+def _stops(tree: component_tree.ComponentTree, random: np.random.Generator, legs: int) -> np.ndarray:
+    """Configurations without self-collision, each some way from the one before, shape (legs + 1, 3 + n)."""
+    lower, upper = tree.range_lower, tree.range_upper
+    start = np.concatenate((np.zeros(2), random.uniform(-np.pi, np.pi, 1), 0.5 * (lower + upper)))
+    corners = [start]
+    for _ in range(legs):
+        z = corners[-1].copy()
+        turn = random.uniform(-np.pi, np.pi)
+        z[:2] += random.uniform(0.3, 1.5) * np.array([np.cos(turn), np.sin(turn)])
+        z[2] += random.uniform(-1.5, 1.5)
+        turned = z[3:] + random.uniform(-0.5, 0.5, len(lower)) * (upper - lower)
+        z[3:] = np.clip(turned, tree.joint_lower, tree.joint_upper)
+        corners.append(z)
+    return np.array(corners)
+
+
+def _pieces(tree: component_tree.ComponentTree, path: np.ndarray) -> list[BaseGeometry]:
+    """Every convex piece at every configuration of a path."""
+    return [
+        placed_shape(shape, X_WC, quad_segs=8)
+        for z in path
+        for component, X_WC in zip(tree.components, tree.poses(z), strict=True)
+        for body in component.bodies
+        for shape in body.shapes
+    ]
+
+
 SLICES = 16
+
+
+@pytest.mark.slow
+@settings(max_examples=6, phases=[Phase.generate], suppress_health_check=list(HealthCheck))
+@given(planted(robots=(1, 2)))
+def test_a_path_known_to_be_free_lies_in_the_over_cells_of_all_relaxations(plant: Planted) -> None:
+    assert blocked_goal(plant.problem)[0] is None
+    assert_no_relaxation_loses(plant.problem, plant.path)
 
 
 @pytest.mark.parametrize("name", ["base"])
