@@ -7,7 +7,7 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from threading import local
+from threading import Lock, local
 from time import perf_counter, thread_time
 
 _BETWEEN_LINES = 10.0
@@ -19,8 +19,8 @@ class Compiling:
     """What this process spends on loading and compiling functions, not on what they compute.
 
     Attributes:
-        wall_seconds: Elapsed wall-clock time [s].
-        cpu_seconds: Elapsed CPU time [s].
+        wall_seconds: Elapsed wall-clock time in which any thread did so [s].
+        cpu_seconds: Elapsed CPU time of all threads [s].
         functions: How many functions of the modules imported so far can be compiled; few calls need all.
         names: Those that were compiled.
         tell: Called with the name of each one when it is compiled; None if nobody waits for it.
@@ -35,19 +35,27 @@ class Compiling:
     def __post_init__(self) -> None:
         """Prepare what each thread has of its own."""
         self._thread, self._told, self._line = local(), -math.inf, False
+        self._lock, self._busy, self._since = Lock(), 0, 0.0
 
     @contextmanager
     def spent(self) -> Iterator[None]:
         """Add the time of a block; a block inside another one counts once."""
-        wall, processor, outer = perf_counter(), thread_time(), getattr(self._thread, "inside", False)
+        processor, outer = thread_time(), getattr(self._thread, "inside", False)
         self._thread.inside = True
+        if not outer:
+            with self._lock:  # threads that wait for one function are counted as one
+                self._since = self._since if self._busy else perf_counter()
+                self._busy += 1
         try:
             yield
         finally:
             self._thread.inside = outer
             if not outer:
-                self.wall_seconds += perf_counter() - wall
-                self.cpu_seconds += thread_time() - processor
+                with self._lock:
+                    self._busy -= 1
+                    if not self._busy:
+                        self.wall_seconds += perf_counter() - self._since
+                    self.cpu_seconds += thread_time() - processor
                 if self._line:
                     sys.stderr.write("\r\033[K")
                     self._line = False

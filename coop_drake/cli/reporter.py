@@ -114,8 +114,7 @@ class Reporter:
             finally:
                 if facts:
                     self._add("loading_cpu_seconds", kernels.cpu_seconds)
-                    own = perf_counter() - wall - kernels.wall_seconds
-                    self._add(f"{facts}_wall_seconds", max(own, 0.0))  # Threads may wait for one kernel.
+                    self._add(f"{facts}_wall_seconds", perf_counter() - wall - kernels.wall_seconds)
                     if cpu:
                         own = _processor_seconds() - processor
                         self._add(f"{facts}_cpu_seconds", own - kernels.cpu_seconds)

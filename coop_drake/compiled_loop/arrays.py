@@ -11,9 +11,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from coop_drake.laws.departures import WorldDepartures
 from coop_drake.laws.robot_dynamics import MOTION_COLUMNS
 from coop_drake.laws.team_dynamics import StickingRoom, TeamWork, sticking_room, team_work
-from coop_drake.systems.departures import WorldDepartures
 from coop_drake.systems.kernels import NOMINAL_SIZE
 from coop_drake.tree.pose import FloatArray, IntArray
 from coop_drake.tree.team_arrays import TeamArrays
@@ -232,7 +232,7 @@ class RobotRoom(NamedTuple):
         errors: Of one measurement, shape (2 (3 + n),).
         line: A line of measurements, then what is measured, shape (rows + 1, 1 + size).
         arrivals: What a channel of reports holds next, of its shape.
-        motion: Motion of the longest chain, see ``chain_motion.motion_room``.
+        motion: Motion of the longest chain, see ``motion_room``.
         shown: What ``show_nominal`` writes, shape (6,).
     """
 
@@ -279,7 +279,7 @@ class MotionRoom(NamedTuple):
         wrenches: On bases and object, shape (N + 1, 3) [N, N m].
         efforts: Of the joints, at the places of their rates, shape (3 + n,) [N m or N].
         robot: State of a robot with the most joints that there can be, shape (2 (3 + n),).
-        motion: Motion of the longest chain, see ``chain_motion.motion_room``.
+        motion: Motion of the longest chain, see ``motion_room``.
         work: Of the equations of motion.
         sticking: Of blocked wheels and of the friction of joints.
         velocities: Of all bases in W, shape (N, 2) [m/s].

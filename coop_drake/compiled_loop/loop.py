@@ -17,11 +17,11 @@ from coop_drake.compiled_loop.robots import compute
 from coop_drake.compiled_loop.watching import ENDED, RUNS, left_by_all, watch
 from coop_drake.jit import compiled
 from coop_drake.laws.actuators import lag_behind, limit_efforts
+from coop_drake.laws.departures import act_on_wrenches
 from coop_drake.laws.measurements import carry_reports, uniform_pair
 from coop_drake.laws.nominal import carry_axes
 from coop_drake.laws.robot_dynamics import read_robot
 from coop_drake.laws.team_dynamics import stick
-from coop_drake.systems.departures import act_on_wrenches
 from coop_drake.systems.kernels import step_nominal
 from coop_drake.tree.pose import FloatArray
 

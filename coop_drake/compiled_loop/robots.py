@@ -155,7 +155,7 @@ def compute(
         judged, judged_robot = room.seen[acts // 2], room.robots[acts // 2, :size]
         if cell == last_cell:
             rows, places = memory.recent.shape[0], cells.places[own : own + size // 2]
-            tolerances, errors = cells.rooms[0, k + begin : k + end], cells.rooms[1, k + begin : k + end]
+            tolerances, errors = cells.rooms[:, k + begin : k + end + 1]
             recent = memory.recent[:, own : own + size // 2]
             margin = arrival_margin(places, tolerances, errors, recent, (sample - 1) % rows)
             shown = led[: 4 if nominal.flow.size else 0]

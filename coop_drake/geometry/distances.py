@@ -65,10 +65,11 @@ def segments_cross(
 def meets_ring(
     vertices: FloatArray, first: int, last: int, ax: float, ay: float, bx: float, by: float
 ) -> bool:
-    """Whether the segment a-b meets a ring of two or more vertices or what it encloses; False for a point.
+    """Whether the segment a-b meets a ring or what it encloses; False for a ring of one vertex.
 
-    The segment is clipped by the half-plane of every edge; of length zero it is met where the ring has an
-    interior that holds the point. The ring is rows first to last - 1 of the vertices, shape (V, 2) [m].
+    The segment is clipped by the half-plane of every edge. One of length zero, with a = b, is a point: it is
+    met where the ring has an interior that holds it. The ring is rows first to last - 1 of the vertices,
+    shape (V, 2) [m].
     """
     if last - first == 1:
         return False

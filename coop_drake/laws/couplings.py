@@ -38,7 +38,7 @@ def disagreement_coupling(
     owners, links = (np.array([int(body[i]) for body in moved]) for i in (5, 0))
     places = np.array([frames[int(body[0])].apply(np.array(body[2:4])) for body in moved])
     masses = np.array([body[1] for body in moved])
-    wrenches = np.zeros((int(owners[-1]) + 1, 2, len(masses), 3))
+    wrenches = np.zeros((int(owners.max()) + 1, 2, len(masses), 3))
     for k, own in enumerate(wrenches):
         own[0, :, 0] = own[1, :, 1] = np.where(owners == k, masses, 0.0)
     states = _at_rest(joints)
@@ -52,10 +52,10 @@ def _at_rest(joints: FloatArray) -> FloatArray:
     """Return states of a team that ``team_accelerations`` takes, at configurations of its joints.
 
     Args:
-        joints: The configurations, shape (configurations, n).
+        joints: The configurations, shape (configurations, n) [rad or m].
 
     Returns:
-        Shape (configurations, 2 (3 + n)).
+        (z, z') with the object at the origin and all rates zero, shape (configurations, 2 (3 + n)).
     """
     states = np.zeros((len(joints), 2 * (3 + joints.shape[1])))
     states[:, 3 : 3 + joints.shape[1]] = joints
@@ -78,11 +78,11 @@ def _accelerations(
         links: The links that are pushed, shape (m,).
         places: Where, in the plane of the object's frame with all joints at zero, shape (m, 2) [m].
         wrenches: Shape (w, m, 3) [N, N m].
-        states: Shape (s, 2 (3 + n)).
+        states: (z, z'), shape (s, 2 (3 + n)) [m, rad, and per second].
         work: Room.
 
     Returns:
-        Shape (s, w, 3 + n).
+        z'', shape (s, w, 3 + n) [m/s^2, rad/s^2].
     """
     n = states.shape[1] // 2
     efforts, found = np.zeros(n), np.empty((states.shape[0], wrenches.shape[0], n))
@@ -93,6 +93,10 @@ def _accelerations(
 
 
 # Centripetal and Coriolis terms: how much the rates of a team's axes accelerate them by themselves.
+
+
+AT_A_TIME = 100
+"""Configurations whose states are in memory at the same time [-]: 24 joints have 325 pairs of rates."""
 
 
 def rate_terms(
@@ -115,14 +119,17 @@ def rate_terms(
     chain, axes = team_chain(tree, bodies, rotors), 1 + joints.shape[1]
     nothing, nowhere = np.empty(0, dtype=np.int64), np.empty((0, 2))
     pairs = np.array([(j, k) for j in range(axes) for k in range(j + 1)])
-    states = np.repeat(_at_rest(joints)[:, None], len(pairs), axis=1)
-    for state, pair in zip(states.swapaxes(0, 1), pairs, strict=True):
-        state[:, 4 + axes + pair] = 1.0
-    rows = states.reshape(-1, states.shape[2])
-    found = _accelerations(chain, nothing, nowhere, np.empty((1, 0, 3)), rows, team_work(chain))
-    found = found.reshape(*states.shape[:2], -1)[:, :, 2:]
-    coefficients, own = np.zeros((len(joints), axes, axes, axes)), found[:, pairs[:, 0] == pairs[:, 1]]
-    for number, (j, k) in enumerate(pairs):
-        both = found[:, number]
-        coefficients[:, :, j, k] = np.abs(both if j == k else both - own[:, j] - own[:, k])
+    coefficients = np.zeros((len(joints), axes, axes, axes))
+    for begin in range(0, len(joints), AT_A_TIME):
+        part = coefficients[begin : begin + AT_A_TIME]
+        states = np.repeat(_at_rest(joints[begin : begin + AT_A_TIME])[:, None], len(pairs), axis=1)
+        for state, pair in zip(states.swapaxes(0, 1), pairs, strict=True):
+            state[:, 4 + axes + pair] = 1.0
+        rows = states.reshape(-1, states.shape[2])
+        found = _accelerations(chain, nothing, nowhere, np.empty((1, 0, 3)), rows, team_work(chain))
+        found = found.reshape(*states.shape[:2], -1)[:, :, 2:]
+        own = found[:, pairs[:, 0] == pairs[:, 1]]
+        for number, (j, k) in enumerate(pairs):
+            both = found[:, number]
+            part[:, :, j, k] = np.abs(both if j == k else both - own[:, j] - own[:, k])
     return coefficients

@@ -132,7 +132,7 @@ SCATTER = 2.5
 """Largest s^2 over d^2 in noise [-]: of 20 independent numbers the share has a deviation of 0.2 about 1."""
 
 FAR = -1.0
-"""Margin of a robot that has not measured for long enough, or at most that of one whose monitor is not quiet
+"""Margin of a robot that has not measured for long enough; one whose monitor is not quiet has no larger one
 [-]."""
 
 
@@ -171,7 +171,8 @@ def arrival_margin(
             fewer, shape (2 W, 3 + n) [m, rad].
         newest: The row of the newest ones; the older ones stand before it, the last row before the first.
     """
-    margin, rows, x = 1.0, recent.shape[0], (0.0, 0.0, 0.0, 0.0)
+    margin, rows = 1.0, recent.shape[0]
+    x = (0.0, 0.0, 0.0, 0.0)  # m_1, m_0, s^2 and d^2 of the object's first coordinate
     half = rows // 2
     for column in range(recent.shape[1]):
         mean = before = scatter = steps = 0.0  # m_1, m_0, s^2 and d^2

@@ -450,7 +450,8 @@ def _carry(
                     state[2, p, i] = max(state[2, p, i], now[2, p, i])
         _enter(now, moving[:, k], (coupling, errors), scales, found[:, k], entered[:, :, :, memory + k])
         for p in range(parts if k > 0 else 0):  # A period ends where the next one begins.
-            found[0, k - 1] = np.maximum(found[0, k - 1], now[0, p])
+            for i in range(axes):
+                found[0, k - 1, i] = max(found[0, k - 1, i], now[0, p, i])
     _settle(responses, coupling, scales, moving[:, ever], entered, state, found)
     found[0, ever - 1] = np.maximum(found[0, ever - 1], found[0, ever])
 

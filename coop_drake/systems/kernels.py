@@ -343,6 +343,7 @@ def robot_arrived(
         distance = np.hypot(nominal[0] - goal[0], nominal[1] - goal[1])
         margin = min(margin, position_arrival(distance, np.hypot(nominal[2], nominal[3]), tolerance))
     if axes_led:
+        # With ``True`` the axes are judged at the goal: no next table and no time are read.
         margin = min(margin, axes_ready(table, table, True, 0.0, object_state, robot))
     return margin
 

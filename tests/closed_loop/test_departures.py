@@ -166,6 +166,13 @@ def test_a_mild_departure_is_survived(name):
     assert verified_run(*deployed(MILD[name]), log).answer == "arrived"
 
 
+def test_the_compiled_loop_judges_every_joint_at_the_goal():
+    scenario, plan = deployed(HARSH["waves"][0])
+    outcome = compiled_run(prepare(scenario, plan, small_maps()))
+    assert not outcome.arrived
+    assert "max_time" in outcome.reason
+
+
 def test_a_thousand_samples_a_second_are_survived_too():
     scenario, plan = small_problem("base")
     fast = replace(scenario, deployment=Deployment(control_rate=1000.0))

@@ -10,6 +10,7 @@ from pydrake.systems.primitives import FirstOrderLowPassFilter, ZeroOrderHold
 
 from coop_drake import systems
 from coop_drake.laws import acceleration_at, wrench_share
+from coop_drake.laws.departures import CREEP_SPEED, act_on_wrenches, without_departures
 from coop_drake.plant import (
     base_poses,
     build_robot_plant,
@@ -17,7 +18,6 @@ from coop_drake.plant import (
     build_team_plant,
     set_configuration,
 )
-from coop_drake.systems.departures import CREEP_SPEED, act_on_wrenches, without_departures
 from tests.support.robot_matrices import turned
 from tests.support.small_scenario import small_scenario
 from tests.support.system_checks import evaluate, port_sizes

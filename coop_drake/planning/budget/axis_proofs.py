@@ -34,9 +34,7 @@ from coop_drake.robustness.axis_departure import (
     at_rest,
     departing,
 )
-from coop_drake.robustness.couplings import (
-    QUICKEST,
-)
+from coop_drake.robustness.couplings import QUICKEST
 from coop_drake.robustness.efforts import (
     CommandInflow,
     LimitedEfforts,

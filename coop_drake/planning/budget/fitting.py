@@ -29,9 +29,7 @@ from coop_drake.planning.budget.axis_proofs import (
     follow_transitions,
 )
 from coop_drake.planning.transitions import share_speeds, with_gains
-from coop_drake.robustness.alarms import (
-    rate_noises,
-)
+from coop_drake.robustness.alarms import rate_noises
 from coop_drake.robustness.axis_departure import (
     HORIZON,
     PULL,
