@@ -207,3 +207,22 @@ def test_what_a_cell_misses_is_held_against_the_room_of_the_next_one(plan, monke
     with pytest.raises(RefusalError, match="a monitor in the cell before may miss") as refusal:
         check_budget(plan)
     assert refusal.value.where.startswith("transitions[1].tolerance.alarm_times")
+
+
+@pytest.mark.parametrize("since", [0, 1])
+def test_what_is_missed_stays_unknown_in_a_cell_that_can_be_left_at_once(plan, monkeypatch, since):
+    """Cell 0 misses a radian, cell 1 nothing; cell 2 has room for half of it."""
+    axes, cells = len(plan.start) - 2, len(plan.transitions)
+    assert cells > 2
+    missed = iter([1.0] + [0.0] * (cells - 1))
+    room = iter([2.0, 2.0] + [0.5] * (cells - 2))
+    left = iter([1, since] + [1] * (cells - 2))
+    monkeypatch.setattr(checks, "_check_axis_alarms", lambda *asked: np.full(axes, next(missed)))
+    monkeypatch.setattr(checks, "room_at_entry", lambda *asked: np.full(axes, next(room)))
+    monkeypatch.setattr(checks, "leaving_since", lambda *asked: next(left))
+    if since:
+        check_budget(plan)
+        return
+    with pytest.raises(RefusalError, match="a monitor in the cell before may miss") as refusal:
+        check_budget(plan)
+    assert refusal.value.where.startswith("transitions[2].tolerance.alarm_times")
