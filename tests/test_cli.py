@@ -228,6 +228,21 @@ def test_a_live_run_is_looked_at_and_says_where_without_waiting_for_anybody(
     assert f"Live view: open {address}" in result.stderr
 
 
+def test_a_live_run_may_wait_for_a_browser_as_long_as_it_takes(finished, room, tmp_path, monkeypatch):
+    waited = []
+
+    def simulated(*_, observer, **__):
+        raise PlanError(f"far enough, after {len(waited)} waits")
+
+    monkeypatch.setattr(simulation, "simulate", simulated)
+    monkeypatch.setattr(LivePage, "wait_for_viewer", lambda _, seconds: waited.append(seconds))
+    plan = finished[0] / "plan.json"
+    result = invoke("simulate", room, "--plan", plan, "--out", tmp_path / "live", "--wait", "--json")
+    assert waited == [inf]
+    assert "after 1 waits" in result.stderr
+    assert "live_url" in json.loads(result.stdout)
+
+
 @pytest.mark.slow
 def test_warming_up_leaves_nothing_behind(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)

@@ -92,3 +92,9 @@ def test_a_run_has_ten_rows_and_names_the_speed_that_is_nearest_to_its_limit():
     assert rows["simulated transport"] == "13.42 s, estimated 13.3 s"
     assert rows["nearest to a limit of speed"] == "rate of left::elbow, 4.00 rad/s, limit 5"
     assert rows["error at the end"] == "0.0056 m, 0.0015 rad"
+
+
+def test_more_rows_are_shown_on_demand():
+    more = dict(summary_rows(RUN, verbose=True))
+    assert more["peak rate of right::elbow"] == "9.00 rad/s, no limit known"
+    assert more["departure of the object under its budget"] == "0.0021 m at most"

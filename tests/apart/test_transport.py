@@ -3,8 +3,10 @@
 import os
 import random
 import signal
+from contextlib import ExitStack
 from dataclasses import replace
 from multiprocessing import get_context
+from socket import create_connection
 from time import monotonic
 
 import msgspec
@@ -246,6 +248,13 @@ def test_who_gets_no_session_is_told_why(team, hello, words, reason):
     assert not team.world.present()
 
 
+def test_a_client_that_is_refused_says_why_and_asks_again(team):
+    robot = team.join(0, plan="another")
+    team.settle(lambda: team.world.refusals.total > 1, robot)
+    with pytest.raises(MessagingError, match=r"the world at .*: it has another plan"):
+        robot.open(0.2)
+
+
 def test_a_client_finds_a_server_that_starts_again_and_counts_anew(team):
     robot = team.connect(0)
     team.works_for(robot)
@@ -301,6 +310,19 @@ def test_a_message_that_is_too_long_closes_its_connection(team):
     team.settle(heard_again)
     assert set(team.refused(1)) == {"SESSION"}
     team.works_for(robot)
+
+
+def test_connections_that_do_not_speak_zeromq_do_no_harm(team):
+    robot, dice = team.connect(0), random.Random(1)
+    place = ("127.0.0.1", int(team.book.world.address.rpartition(":")[2]))
+    with ExitStack() as opened:
+        for number in range(60):
+            connection = opened.enter_context(create_connection(place))
+            if number % 3 == 0:  # The others stay silent.
+                connection.sendall(b"GET / HTTP/1.1\r\n\r\n" + dice.randbytes(200))
+        team.works_for(robot)
+    team.works_for(robot)
+    assert robot.sessions[msg.WORLD].count == 1
 
 
 def test_a_peer_that_floods_takes_turns_with_the_others_and_is_not_kept_for_ever(team):

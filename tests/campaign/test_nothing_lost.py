@@ -205,9 +205,14 @@ def test_a_campaign_that_is_disturbed_in_every_way_ends_as_one_that_is_not(undis
     assert undisturbed.missing(folder)
 
     second = begun(folder.path, "--workers", 1)
+    worker_of(folder)
+    ended(second, folder, signal.SIGTERM)
+    assert undisturbed.missing(folder)
+
+    third = begun(folder.path, "--workers", 1)
     worker = worker_of(folder)
-    kill(second.pid)
-    second.communicate()
+    kill(third.pid)
+    third.communicate()
     waited_for(lambda: not processes(str(folder.path)) and gone(worker))
     assert undisturbed.missing(folder)
 

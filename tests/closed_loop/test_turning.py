@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from shapely import box
 
+from coop_drake.answers import Undecided
 from coop_drake.answers.plan import Cell
 from coop_drake.errors import RefusalError
 from coop_drake.laws import ScheduledGains
@@ -37,12 +38,12 @@ def deployed(**changes):
     return convert_class(Deployment.completed({"preset": "mobile_base", **changes}), Deployment)
 
 
-@cache
-def planned(counted=True):
+def asked(**measurements):
+    """A scenario with a quick turn, its question, and the budget of the preset with other measurements."""
     scenario = small_scenario("elbow")
     pose = scenario.start.object
     goal = ObjectPose(pose.x + 0.2, pose.y, pose.theta + TURN)
-    deployment = deployed(actuators={"base_force": None}, measurements=QUIET)
+    deployment = deployed(actuators={"base_force": None}, measurements=measurements)
     scenario = replace(
         scenario, deployment=deployment, start=Start(pose, ARMS), limits={},
         goal=Goal(goal, ARMS, scenario.goal.tolerances),
@@ -50,7 +51,12 @@ def planned(counted=True):
     gains = ScheduledGains().for_age(deployment.command_age)
     scenario = replace(scenario, gains=replace(scenario.gains, sets={"scheduled": gains}))
     problem = planning_problem(scenario)
-    budget = budget_of("all", scenario, problem)
+    return scenario, problem, gains, budget_of("all", scenario, problem)
+
+
+@cache
+def planned(counted=True):
+    scenario, problem, gains, budget = asked(**QUIET)
     if not counted:
         budget = replace(budget, bodies=(), rotors=())
     plan = make(problem, gains, gain_set_name="scheduled", budget=budget).plan
@@ -86,6 +92,14 @@ def test_without_rate_terms_axes_come_nearer_to_their_bounds_than_stated():
     assert spared(plan, log).min() < -0.01
     with pytest.raises(RefusalError, match="nearer to a bound of its funnel than stated"):
         check_budget_used(Rows(log, plan))
+
+
+@pytest.mark.slow
+def test_with_the_noise_of_the_preset_the_monitors_have_no_room():
+    _, problem, gains, budget = asked()
+    answer = make(problem, gains, gain_set_name="scheduled", budget=budget)
+    assert isinstance(answer, Undecided)
+    assert "may leave its funnel before its monitor sees it" in answer.reason
 
 
 HALF_WIDTH = 0.03

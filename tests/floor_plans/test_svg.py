@@ -300,6 +300,8 @@ LOOKS = {
         GONE,
     ),
     "transparent stroke": ("path{stroke:rgba(0,0,0,0);fill:none}", across(), GONE),
+    "opacity of the stroke": ("path{stroke:red;fill:none;stroke-opacity:0.0}", across(), GONE),
+    "width of zero": ("path{stroke:red;fill:none;stroke-width:0}", across(), GONE),
     "a line has no fill": ("", "<line x1='5' x2='5' y2='6' fill='red'/>", GONE),
     "current colour": ("g{color:red}path{stroke:currentColor;stroke-width:.4}", f"<g>{across()}</g>", WALL),
     "percentage of the diagonal": (
@@ -411,6 +413,7 @@ NOT_READ = {
     "revert": ("path{stroke:revert}", across(), "stroke: revert is not read"),
     "mask": ("", "<mask id='m'/><g mask='url(#m)'/>", "<g>: a mask decides what is seen of it"),
     "filter": ("g{filter:blur(1px)}", "<g/>", "<g>: a filter decides what is seen of it"),
+    "vendor": ("g{-webkit-clip-path:inset(1px)}", "<g/>", "-webkit-clip-path is not read"),
     "clip path of the property": (
         "g{clip-path:inset(1px)}",
         "<g/>",

@@ -147,6 +147,14 @@ def test_the_page_stands_alone_and_every_reason_is_explained(material, report):
         assert f"{count} {agreement.value}" in page
 
 
+def test_the_markdown_says_the_same_and_its_pictures_are_there(material, report):
+    text = (report / "report.md").read_text()
+    pictures = re.findall(r"!\[.*?\]\((.*?)\)", text)
+    found = [picture.file for exhibit in exhibits(material) for picture in exhibit.pictures]
+    assert pictures == [*found, "errata.png"]
+    assert all((report / picture).is_file() for picture in pictures)
+
+
 def test_errata_are_those_of_the_documents_and_every_assumption_is_used(material):
     in_documents = set(re.findall(r"^- \*\*(E\w+)\*\*", (DOCS / "errata.md").read_text(), re.MULTILINE))
     assert set(ERRATA) <= in_documents

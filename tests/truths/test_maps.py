@@ -98,7 +98,7 @@ def steepness(field, path, parts):
 
 @FEW
 @given(CELLS)
-def test_disk_is_filled_without_folds_and_walls_push_inwards(cell):
+def test_disk_is_filled_without_folds_to_the_certified_error_and_walls_push_inwards(cell):
     harmonic_map = HarmonicMap(cell, goal_of(cell))
     field = VelocityField(harmonic_map)
     near, _ = domains.off_wall(cell, 1e-3)
@@ -110,6 +110,9 @@ def test_disk_is_filled_without_folds_and_walls_push_inwards(cell):
     assert (det > -noise).all()
     walls, normals = domains.off_wall(cell, 0.0)
     assert min(field(p) @ n for p, n in zip(walls, normals, strict=True)) > 0.0
+    edge = shapely.get_coordinates(shapely.segmentize(harmonic_map.region.exterior, 0.003))
+    error = np.abs(np.hypot(*harmonic_map(edge)[0].T) - 1.0).max()
+    assert error <= 1.5 * harmonic_map.accuracy.error_estimate + 1e-12
 
 
 @FEW

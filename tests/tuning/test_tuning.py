@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import multiprocessing
+import sys
 import threading
 from dataclasses import replace
 from functools import cache
@@ -63,6 +64,17 @@ def test_criteria_are_read_from_the_run():
     assert values["peak_torque"] == 2.5
     assert 0.0 < values["mean_force"] < 5.0
     assert values["clearance"] == log.workspace_clearance.min()
+
+
+def test_a_constant_force_is_its_own_mean_however_steps_are_spread():
+    log = synthetic_log(case("base"))
+    forces = np.zeros_like(log.base_wrenches)
+    forces[:200, :, 0] = 6.0
+    forces[200:, :, 1] = 8.0
+    fraction = np.linspace(0.0, 1.0, len(log.times)) ** 3
+    values = outcome_of(replace(log, base_wrenches=forces, times=SECONDS * fraction), 5).values
+    early = 0.5 * (fraction[199] + fraction[200])
+    assert values["mean_force"] == pytest.approx((early * 36.0 + (1.0 - early) * 64.0) ** 0.5)
 
 
 def test_a_run_that_broke_off_counts_the_cells_it_passed():
@@ -314,6 +326,14 @@ def test_what_makes_no_sense_is_refused_before_any_work(room, tmp_path, argument
     result = called(room, *arguments, "--out", tmp_path / "out")
     assert result.exit_code == 2
     assert complaint in " ".join(result.output.split())
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_missing_optimizer_is_named_before_any_work(room, tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "cma", None)
+    result = called(room, "--out", tmp_path / "out")
+    assert result.exit_code == 2
+    assert "pip install 'cma>=4.0'" in " ".join(result.output.split())
     assert not (tmp_path / "out").exists()
 
 

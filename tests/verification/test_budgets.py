@@ -8,6 +8,8 @@ import pytest
 from coop_drake.answers import load_plan
 from coop_drake.errors import RefusalError
 from coop_drake.laws.axis_table import axis_table, bounds_of, track_row
+from coop_drake.plant import planning_problem
+from coop_drake.scenario import load_scenario
 from coop_drake.verification import budget as checks
 from coop_drake.verification.budget import check_budget, check_room
 from coop_drake.verification.runs.budget import commanded
@@ -198,6 +200,20 @@ def test_bad_budgets_are_bad_input(folder, tmp_path):
         (tmp_path / "budget.yaml").write_text(text)
         result = invoke("plan", folder / "room.scenario.yaml", "--budget", tmp_path / name)
         assert (result.exit_code, key in result.output) == (2, True)
+
+
+def test_a_plan_with_bodies_is_checked_with_its_team_and_those_of_others_are_refused(folder, plan):
+    tree = planning_problem(load_scenario(folder / "room.scenario.yaml")).tree
+    strange = replace(plan, budget=replace(plan.budget, bodies=((9, 1.0, 0.0, 0.0, 0.1, 0.0),)))
+    with pytest.raises(ValueError, match="tree: expected the team"):
+        check_budget(strange)
+    for other, where in (
+        (strange, "budget.bodies"),
+        (replace(plan, budget=replace(plan.budget, rotors=(0.0,))), "budget.rotors"),
+    ):
+        with pytest.raises(RefusalError) as refusal:
+            check_budget(other, tree)
+        assert refusal.value.where == where
 
 
 def test_what_a_cell_misses_is_held_against_the_room_of_the_next_one(plan, monkeypatch):

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from matplotlib.collections import LineCollection, PathCollection
 from matplotlib.colors import to_hex
+from matplotlib.patches import FancyBboxPatch
 from PIL import Image
 
 from coop_drake.answers.speeds import base_speeds
@@ -223,6 +224,19 @@ def test_the_picture_names_every_block_and_port(loop, controller):
         assert {block.name.replace("_", " "), *block.inputs, *block.outputs} <= texts
     assert {"robot 2 controller", "cell planner", "transport station"} <= texts
     assert "Controller of robot 1" in {text.get_text() for text in figure.axes[1].texts}
+
+
+def test_the_picture_fits_a_page_turned_sideways_and_its_texts_their_blocks(loop):
+    figure = block_diagram_figure(loop)
+    width, height = figure.get_size_inches()
+    assert width <= 11.69
+    assert height <= 8.27
+    figure.draw_without_rendering()
+    for ax in figure.axes:
+        blocks = [patch.get_window_extent() for patch in ax.patches if isinstance(patch, FancyBboxPatch)]
+        for text in ax.texts[1:]:
+            place = text.get_window_extent()
+            assert any(block.x0 <= place.x0 and place.x1 <= block.x1 for block in blocks)
 
 
 def test_a_robot_that_is_not_there_is_refused(loop):

@@ -93,6 +93,7 @@ def test_team_cell_forces_and_trail_follow_the_run(shown):
     assert [visible(meshcat, f"/plan/{kind}/001") for kind in ("cells", "goal_regions")] == [True, True]
     assert umsgpack.unpackb(meshcat._GetPackedProperty("/forces/robot_1", "scale"))["value"][0] == 0.8
     assert meshcat.HasPath("/motion/trail/00000")
+    assert not view.wait_for_viewer(0.0)
 
 
 def test_steps_just_after_a_frame_are_left_out_but_the_last_one_is_shown(shown):
@@ -236,6 +237,12 @@ def test_a_server_that_is_started_says_nothing(logged):
     assert logged == []
 
 
+def test_others_that_are_started_later_do_so_again(logged):
+    silent_meshcat()
+    Meshcat()
+    assert [line.partition(" at ")[0] for line in logged] == ["Meshcat listening for connections"]
+
+
 def test_only_browsers_on_this_machine_reach_it():
     meshcat = silent_meshcat()
     with socket.create_connection(("127.0.0.1", meshcat.port()), timeout=10.0):
@@ -315,6 +322,28 @@ def test_the_object_moves_as_it_was_logged(text):
     keys, turns = track(text, OBJECT, "quaternion")
     angles = np.unwrap(2.0 * np.arctan2(turns[:, 2], turns[:, 3]))
     np.testing.assert_allclose(np.interp(times, keys, angles), logged[:, 2], rtol=0, atol=1e-2)
+
+
+def test_the_goals_frame_is_as_high_as_the_object(text):
+    """The shipped object is a box 0.2 m high whose middle is 0.4 m above the floor."""
+    told = [message for message in messages(text) if message.get("path") == "/plan/goal_pose/frame"]
+    packed = told[0]["object"]["geometries"][0]["data"]["attributes"]["position"]["array"]
+    heights = np.frombuffer(packed.data, dtype=np.float32).reshape(-1, 3)[:, 2]
+    np.testing.assert_allclose([heights.min(), heights.max()], [0.3, 0.5], atol=1e-6)
+
+
+def test_every_track_lasts_as_long_as_the_slider(text):
+    ends = {
+        track(text, path, name)[0][-1]
+        for path, name in (
+            (OBJECT, "position"),
+            ("/forces/robot_0", "scale"),
+            ("/plan/cells/000", "visible"),
+            ("/motion/trail/<object>", "geometry[drawRange].count"),
+        )
+    }
+    (duration,) = re.findall(r'"duration": ([\d.]+)', text)
+    assert ends == {float(duration)}
 
 
 def test_the_cells_take_turns_as_they_were_logged(text):
@@ -472,3 +501,13 @@ def test_robots_of_one_model_get_the_colours_of_the_figures(twins):
 
 def test_the_scene_paints_arrows_and_grasps_alike(twins):
     assert hex_colour(TeamView(twins, Meshcat()).colours[1]) == robot_colour(1).lower()
+
+
+def test_robots_of_different_models_keep_their_colours():
+    builder = DiagramBuilder()
+    team = build_team_plant(load_scenario(SCENARIO), builder)
+    before = [painted(team, robot.base_body) for robot in team.robots]
+    colours = [hex_colour(one) for one in paint_robots(team)]
+    builder.Build()
+    assert [painted(team, robot.base_body) for robot in team.robots] == before
+    assert len(set(colours)) == 2

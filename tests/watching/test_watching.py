@@ -219,6 +219,19 @@ def test_no_more_states_than_asked_for_the_last_one_the_verdict_no_split_lost(mo
     assert len(found[-1].history) == sum(isinstance(event, ChannelSearched) for event in recorded)
 
 
+def test_states_lie_evenly_over_the_steps():
+    recorded = rod_recording().events
+    every = [state.slices for state in search_states(recorded, 10_000)]
+    steps = [every.index(state.slices) for state in search_states(recorded, 6)]
+    gaps = np.diff(steps)
+    assert gaps.max() - gaps.min() <= 3
+
+
+def test_a_single_keyframe_is_refused():
+    with pytest.raises(ValueError, match="2 keyframes or more, got 1"):
+        search_states([], 1)
+
+
 def test_explorations_that_take_turns_are_kept_apart():
     events = [
         ExplorationBegan("first", (0,)),
@@ -407,3 +420,18 @@ def test_a_mistake_is_answered_with_what_is_allowed_and_leaves_nothing(room, tmp
     assert result.exit_code == 2
     assert said in result.stderr
     assert not (tmp_path / "out").exists()
+
+
+def test_an_interruption_leaves_whole_files_only(room, tmp_path, monkeypatch):
+    def interrupted(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("coop_drake.watching.scene.scene_page", interrupted)
+    result = invoke("watch", room, "--output", tmp_path, "--frames", 2)
+    assert result.exit_code == 130
+    written = {path.name for path in tmp_path.iterdir()}
+    pictures = {"think_0001.png", "think_0002.png", "think.png", "think.gif"}
+    assert written == {".coop_drake_results.json", *pictures}
+    for name in pictures:
+        with Image.open(tmp_path / name) as image:
+            image.load()
