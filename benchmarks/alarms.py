@@ -67,7 +67,7 @@ def _rows(team: str, _: Sequence[Row]) -> list[Row]:
 def false_alarm_chance(scenario: Scenario, plan: Plan, robots: int, samples: int) -> float:
     """Bound the chance that normal noise alone makes a monitor ask for a hold in a whole transport.
 
-    What robots' different noise does to the axes is not in it, see "Robots that disagree" in docs/budget.md.
+    It does not count the noise by which robots disagree, see "Robots that disagree" in docs/budget.md.
     All other departures are at their bounds with the worst signs at all times, so that only what noise may
     cause is left below a level: n (1 + ||h||_1), of which the noise itself takes a standard deviation of at
     most sigma (1 + ||h||_2). The chances of all samples, robots and levels are added up.

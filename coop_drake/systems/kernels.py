@@ -151,7 +151,7 @@ def step_nominal(
 ) -> None:  # fmt: skip
     """Write p^, p^' and p_G a period later.
 
-    p_G goes no farther than with its largest speed, and no farther than half of what d - a leaves.
+    A step of p_G is at most T times its largest speed, and at most half of d - a.
 
     Args:
         row: The governor's row, see ``governed_gains``, shape (9,); K does not change at a hand-over.
