@@ -64,7 +64,8 @@ def faults(mutant: Mutant, file: Path, arguments: list[str], remedy: str = REMED
         "file or remedy are not named": not all(file.name in k and remedy in k for k in message.splitlines()),
         f"the message has {len(message)} characters": len(message) > 2000,
         f"standard error says {complained.getvalue()!r}": complained.getvalue() != f"Error: {message}\n",
-        "it is refused for a repeated section, not for its own fault": "planner" in message and "at most once" in message,
+        "it is refused for a repeated section, not for its own fault": "planner" in message
+        and "at most once" in message,
         "something was written": sorted(file.parent.iterdir()) != before,
     }
     return [f"{mutant.kind}: {fault} -- {message[:240]}" for fault, found in wrong.items() if found]
