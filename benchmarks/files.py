@@ -110,7 +110,8 @@ def _ask(name: str, given: Path) -> None:
             return
         if event == "call":
             depth += code.co_name == window
-            if depth and code.co_name != "<module>":
+            # Numba shows its functions with no globals; they are found by the names of those that call them.
+            if depth and code.co_name != "<module>" and frame.f_globals:
                 ran[code] = frame.f_globals
         elif event == "return" and code.co_name == window:
             depth -= 1
