@@ -14,7 +14,7 @@ from shapely import Polygon, union_all
 from coop_drake.answers.problem import PlanningProblem
 from coop_drake.drawing.canvas import draw_polygon, draw_team, draw_workspace, new_figure
 from coop_drake.drawing.colours import FLOOR, INK, PROVED_FREE, UNDECIDED
-from coop_drake.geometry.swept_tree import BodyPairs, Intervals, SweptTree
+from coop_drake.geometry.swept_tree import Intervals, SweptTree
 from coop_drake.planning.cells.cells import CellMaker, Region
 from coop_drake.watching.pictures import draw_section
 
@@ -41,7 +41,7 @@ def slice_figure(problem: PlanningProblem, slices: Sequence[Intervals]) -> Figur
     for (left, right), intervals in zip(rows, slices, strict=True):
         swept = SweptTree(problem.tree)
         _draw_footprints(left, problem, swept, intervals)
-        _draw_cells(right, problem, CellMaker(swept, BodyPairs(swept), problem.workspace), intervals)
+        _draw_cells(right, problem, CellMaker(swept, problem.workspace), intervals)
     return figure
 
 

@@ -10,8 +10,7 @@ from typing import Any
 import numpy as np
 import shapely
 
-from coop_drake.answers.limits import TeamLimits
-from coop_drake.answers.problem import PlanningProblem
+from coop_drake.answers.problem import PlanningProblem, TeamLimits
 from coop_drake.tree.component_tree import Component, ComponentTree, ConvexShape, TreeJoint
 from coop_drake.typed_data import to_plain
 

@@ -6,10 +6,42 @@ from typing import Annotated, Literal
 import numpy as np
 from shapely import Polygon
 
-from coop_drake.answers.limits import TeamLimits
 from coop_drake.tree.component_tree import Component, ComponentTree
 from coop_drake.tree.pose import FloatArray
-from coop_drake.typed_data import Limits, NotNegative, Positive
+from coop_drake.typed_data import Bounds, Limits, NotNegative, Positive
+
+
+def _none() -> FloatArray:
+    return np.empty(0)
+
+
+@dataclass(frozen=True)
+class TeamLimits:
+    """What the robots' models and the scenario say about limits, N robots and n joints.
+
+    Attributes:
+        base_components: Of every robot the index of its base's component in the team's tree.
+        base_points: Origin of the base's frame Bk in that component's frame [m].
+        base_speeds: Largest speed of that origin in W, shape (N,) [m/s].
+        turn_rates: Largest rate of the base's angle in W, shape (N,) [rad/s].
+        joint_rates: Largest rate of every joint, shape (n,) [rad/s or m/s].
+        joint_accelerations: Largest acceleration of every joint, shape (n,) [rad/s^2 or m/s^2].
+        joint_efforts: Largest effort of every joint's motor, shape (n,) [N m or N].
+    """
+
+    base_components: tuple[int, ...] = ()
+    base_points: tuple[tuple[float, float], ...] = ()
+    base_speeds: Bounds = field(default_factory=_none)
+    turn_rates: Bounds = field(default_factory=_none)
+    joint_rates: Bounds = field(default_factory=_none)
+    joint_accelerations: Bounds = field(default_factory=_none)
+    joint_efforts: Bounds = field(default_factory=_none)
+
+    @property
+    def any(self) -> bool:
+        """Whether there is a limit of a speed or rate."""
+        return bool(np.isfinite(np.concatenate((self.base_speeds, self.turn_rates, self.joint_rates))).any())
+
 
 LIMIT_ROOM = 0.01
 """A joint may be planned this far around its start and its goal, even beyond a limit [rad].

@@ -85,7 +85,7 @@ def answer_to(
         gain_set = task.scenario.gain_sets[name]
         work = partial(plan, task.problem, gain_set, gain_set_name=name, budget=tolerated, effort=effort)
         if simulated:
-            from coop_drake.geometry.distances import nearest_fraction
+            from coop_drake.geometry.polygons import nearest_fraction
 
             nearest_fraction(0.0, 0.0, 0.0, 0.0, 1.0, 0.0)  # Both processes then have what numba loads first.
             prepare = partial(prepare_simulation, task.scenario)

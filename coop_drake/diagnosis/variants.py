@@ -17,7 +17,6 @@ from coop_drake.answers import PlanningProblem
 from coop_drake.diagnosis.contacts import CollidingStretch, colliding_stretches
 from coop_drake.errors import GeometryError, PlanError
 from coop_drake.geometry.polygons import parts_of
-from coop_drake.geometry.swept_tree import BodyPairs, SweptTree
 from coop_drake.planning.boxes import Certifier
 from coop_drake.planning.cells.exploration import Verdict
 from coop_drake.planning.channel import ended, make_channel
@@ -45,10 +44,9 @@ def is_free(problem: PlanningProblem, path: FloatArray) -> tuple[bool, int]:
     """
     if not problem.workspace.contains(exact_footprint(problem.tree, path[0])):
         return False, 0  # Boxes show that a path meets no wall, but not on which side of it the path begins.
-    swept = SweptTree(problem.tree)
     try:
         workspace, scale = marginal_workspace(problem, 0.0), configuration_scale(problem.tree)
-        certifier = Certifier(swept, BodyPairs(swept), workspace, scale, 0.0)
+        certifier = Certifier(problem.tree, workspace, scale, 0.0)
         proved = certifier.boxes(path, longest=True, smallest=True) is not None
     except GeometryError:
         return False, 0

@@ -14,8 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from shapely import LineString, Polygon
 
 from coop_drake.errors import GeometryError
-from coop_drake.geometry.distances import squared_distance
-from coop_drake.geometry.polygons import BoundaryDistance, edges_of, extent_of
+from coop_drake.geometry.polygons import BoundaryDistance, edges_of, extent_of, squared_distance
 from coop_drake.jit import compiled
 from coop_drake.tree.pose import FloatArray
 

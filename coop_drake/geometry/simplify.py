@@ -12,9 +12,16 @@ from numpy.typing import NDArray
 from shapely import LineString, Point, Polygon
 
 from coop_drake.errors import GeometryError
-from coop_drake.geometry.distances import segments_cross, squared_distance, twice_area
 from coop_drake.geometry.passage import IndexArray, PassageFinder
-from coop_drake.geometry.polygons import BoundaryDistance, component_at, corners_of, extent_of
+from coop_drake.geometry.polygons import (
+    BoundaryDistance,
+    component_at,
+    corners_of,
+    extent_of,
+    segments_cross,
+    squared_distance,
+    twice_area,
+)
 from coop_drake.jit import compiled
 from coop_drake.tree.pose import FloatArray
 

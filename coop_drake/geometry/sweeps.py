@@ -7,13 +7,16 @@ from math import atan2, ceil, cos, floor, hypot, pi, sin, sqrt
 import numpy as np
 
 from coop_drake.jit import compiled
+from coop_drake.tree.component_tree import TeamArrays, moved
 from coop_drake.tree.pose import FloatArray
-from coop_drake.tree.team_arrays import TeamArrays, moved
 
 # Convex polygons as sets of supporting lines ``n(angle) . x <= offset``: the arithmetic of all sweeps.
 
 SLACK = 1e-9
 """Directed rounding [m]: outer offsets grow and inner offsets shrink by it."""
+
+TOUCH = 1e-6
+"""Swept bodies closer than this touch [m]."""
 
 
 def following(ring: FloatArray) -> FloatArray:

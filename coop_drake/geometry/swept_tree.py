@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
-from coop_drake.geometry.distances import separated
+from coop_drake.geometry.polygons import separated
 from coop_drake.geometry.sweeps import (
+    TOUCH,
     closed_directions,
     common_disc,
     disc_turn,
@@ -18,9 +20,8 @@ from coop_drake.geometry.sweeps import (
     under_prismatic,
     under_revolute,
 )
-from coop_drake.tree.component_tree import ComponentTree, ConvexShape, TreeJoint
+from coop_drake.tree.component_tree import ComponentTree, ConvexShape, TeamArrays, TreeJoint
 from coop_drake.tree.pose import FloatArray
-from coop_drake.tree.team_arrays import TeamArrays
 
 # Over- and under-footprints of the team over a compound slice, eq. (6), cached by the ancestors' slices.
 #
@@ -79,6 +80,11 @@ class SweptTree:
         self.arrays: TeamArrays = tree.arrays
         self._over: dict[tuple[object, ...], FloatArray] = {}
         self._under: dict[tuple[object, ...], FloatArray] = {}
+
+    @cached_property
+    def pairs(self) -> BodyPairs:
+        """Its pairs of bodies that must not touch."""
+        return BodyPairs(self)
 
     def over(self, index: int, intervals: Intervals, stages: int | None = None) -> FloatArray:
         """Polygon that encloses a piece at every configuration of a slice, the object's origin at p_WL = 0.
@@ -174,9 +180,6 @@ def inscribed(vertices: FloatArray, radius: float, largest_turn: float) -> Float
 
 # Collisions among object, arms and bases: pairs of bodies over a slice, which eq. (4) leaves out.
 
-TOUCH = 1e-6
-"""Bodies closer than this touch [m]."""
-
 
 @dataclass(frozen=True)
 class BodyPair:
@@ -202,21 +205,11 @@ class BodyPairs:
 
     Attributes:
         pairs: All pairs of bodies.
-        pieces: All pairs of their pieces, each with its stages to the common component, shape (k, 4).
     """
 
     def __init__(self, swept: SweptTree) -> None:
         self._swept = swept
         self.pairs = tuple(self._pair(a, b) for a, b in swept.tree.collision_pairs)
-        self.pieces = np.array(
-            [
-                (i, j, pair.first_stages, pair.second_stages)
-                for pair in self.pairs
-                for i in pair.first
-                for j in pair.second
-            ],
-            dtype=np.int64,
-        ).reshape(-1, 4)
         self._touch: dict[tuple[object, ...], bool] = {}
         self._overlap: dict[tuple[object, ...], bool] = {}
 
@@ -260,17 +253,15 @@ class BodyPairs:
         return False
 
     def _pair(self, first: tuple[int, int], second: tuple[int, int]) -> BodyPair:
-        chains = [self._swept.tree.ancestors[component] for component, _ in (first, second)]
-        common = next(i for i in chains[0] if i in chains[1])
-        stages = [chain.index(common) for chain in chains]
+        tree, stages = self._swept.tree, self._swept.tree.stages_between(first[0], second[0])
         members = [
             tuple(n for n, piece in enumerate(self._swept.pieces) if (piece.component, piece.body) == body)
             for body in (first, second)
         ]
         axes = [
             1 + joint.index
-            for chain, count in zip(chains, stages, strict=True)
-            for joint in (self._swept.tree.components[i].joint for i in chain[:count])
+            for (component, _), count in zip((first, second), stages, strict=True)
+            for joint in (tree.components[i].joint for i in tree.ancestors[component][:count])
             if joint is not None
         ]
-        return BodyPair(members[0], members[1], stages[0], stages[1], tuple(sorted(axes)))
+        return BodyPair(members[0], members[1], *stages, tuple(sorted(axes)))

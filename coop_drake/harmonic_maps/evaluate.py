@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from coop_drake.geometry.distances import nearest_fraction, ray_crosses, squared_distance
+from coop_drake.geometry.polygons import nearest_fraction, ray_crosses, squared_distance
 from coop_drake.harmonic_maps.panels import gauss_nodes
 from coop_drake.jit import compiled
 from coop_drake.tree.pose import FloatArray, IntArray

@@ -16,7 +16,7 @@ from math import ceil, cos, log, log1p, pi, sin
 import numpy as np
 from numpy.polynomial import legendre
 
-from coop_drake.geometry.distances import squared_distance
+from coop_drake.geometry.polygons import squared_distance
 from coop_drake.harmonic_maps.outline import Outline
 from coop_drake.jit import compiled
 from coop_drake.tree.pose import ComplexArray, FloatArray, IntArray

@@ -9,15 +9,14 @@ from typing import NamedTuple
 import numpy as np
 from shapely import MultiPolygon, Polygon
 
-from coop_drake.geometry.distances import separated
-from coop_drake.geometry.sweeps import disc_turn, grown, over_joint
-from coop_drake.geometry.swept_tree import TOUCH, BodyPairs, SweptTree
+from coop_drake.geometry.polygons import separated
+from coop_drake.geometry.sweeps import TOUCH, disc_turn, grown, over_joint
 from coop_drake.jit import compiled
 from coop_drake.planning.cells.cells import FreeBox
 from coop_drake.planning.duration import SETTLING_TIME, SPEED_PER_CLEARANCE
 from coop_drake.planning.sampling.collision import ObstacleGrid, densified, grid_inside, ring_clearance
+from coop_drake.tree.component_tree import ComponentTree, TeamArrays
 from coop_drake.tree.pose import FloatArray, IntArray
-from coop_drake.tree.team_arrays import TeamArrays
 
 # Compiled over-sweeps of a whole team through a box, and whether its bodies touch anywhere in it.
 
@@ -402,8 +401,7 @@ class Certifier:
     samples, the path is sampled more closely.
 
     Args:
-        swept: Sweeps of the team's pieces.
-        pairs: Self-collision of the team.
+        tree: The team.
         workspace: Where the team may be; the margin is already taken off [m].
         scale: How far a unit of each axis of z moves the team, shape (3 + n,).
         margin: Clearance that the boxes' positions have beyond that [m].
@@ -414,14 +412,13 @@ class Certifier:
 
     def __init__(
         self,
-        swept: SweptTree,
-        pairs: BodyPairs,
+        tree: ComponentTree,
         workspace: Polygon | MultiPolygon,
         scale: FloatArray,
         margin: float,
     ) -> None:
-        self._boxes = box_arrays(swept, pairs)
-        self._grid: ObstacleGrid = grid_inside(workspace, swept.tree.reach)
+        self._boxes = box_arrays(tree)
+        self._grid: ObstacleGrid = grid_inside(workspace, tree.reach)
         self._scale, self._margin = scale, margin
         self._reach, self._level = FIRST_REACH, 0
         self.trials = 0
@@ -494,19 +491,19 @@ def _finer(samples: FloatArray, i: int) -> FloatArray:
     return np.concatenate((samples[: i + 1], between, samples[i + 1 :]))
 
 
-def box_arrays(swept: SweptTree, pairs: BodyPairs) -> BoxArrays:
+def box_arrays(tree: ComponentTree) -> BoxArrays:
     """Arrays of a team for the compiled boxes; a piece that several collision pairs need is swept once."""
-    rows = pairs.pieces.tolist()
+    rows = tree.arrays.pairs.tolist()
     needed = {(i, stages) for i, _, stages, _ in rows} | {(j, stages) for _, j, _, stages in rows}
     sweeps = sorted(needed, key=lambda sweep: (-sweep[0], sweep[1]))
     row = {sweep: k for k, sweep in enumerate(sweeps)}
     infinite = np.array([np.inf])
     return BoxArrays(
-        swept.arrays,
+        tree.arrays,
         _table(sweeps),
         _table([(row[i, first], row[j, second]) for i, j, first, second in rows]),
-        np.concatenate((-infinite, swept.tree.joint_lower)),
-        np.concatenate((infinite, swept.tree.joint_upper)),
+        np.concatenate((-infinite, tree.joint_lower)),
+        np.concatenate((infinite, tree.joint_upper)),
     )
 
 

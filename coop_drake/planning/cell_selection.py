@@ -15,7 +15,7 @@ from coop_drake.answers.digest import problem_digest
 from coop_drake.answers.plan import Plan
 from coop_drake.answers.problem import PlanningProblem
 from coop_drake.errors import GeometryError, PlanError, StallError, TooQuickError
-from coop_drake.geometry.swept_tree import BodyPairs, SweptTree
+from coop_drake.geometry.swept_tree import SweptTree
 from coop_drake.jit import compiled
 from coop_drake.laws import GainSet
 from coop_drake.laws.gains import Schedule, schedule_of, scheduled_axis, scheduled_governor
@@ -207,9 +207,8 @@ def cover_path(
         shape (2,) [m]; None if no sequence of such boxes was found.
     """
     swept = SweptTree(problem.tree)
-    pairs = BodyPairs(swept)
     floor = shrunk(problem.workspace, 0.0)
-    boxes, grid = box_arrays(swept, pairs), grid_inside(floor, problem.tree.reach)
+    boxes, grid = box_arrays(problem.tree), grid_inside(floor, problem.tree.reach)
     angle = float(path[-1, 2] + nearest_turn(float(problem.goal_pose[2] - path[-1, 2])))
     goals = np.array(final_intervals(problem, goal_values(problem, angle, path[-1, 2:])))
     limits = np.full(len(problem.start) - 1, np.inf) if limits is None else limits
@@ -227,7 +226,7 @@ def cover_path(
             least_clearance,
         )  # fmt: skip
         rows, margin = choose_boxes(waypoints), CORE_FRACTION * least_clearance
-        regions = Regions(problem, swept, pairs, margin)
+        regions = Regions(problem, swept, margin)
         tried = [regions.around(_box(waypoints, *row)) for row in rows.tolist()]
         free = tuple(box for box in tried if box is not None)  # Over-sweeps prove regions around their ends.
         if 0 < len(free) == len(rows):

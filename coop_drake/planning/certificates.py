@@ -17,7 +17,7 @@ from coop_drake.answers.proof import Cut, InfeasibilityProof, OverCell, OverSlic
 from coop_drake.errors import GeometryError
 from coop_drake.geometry.minkowski import FreeSpace, shared, to_polygon
 from coop_drake.geometry.polygons import parts_of
-from coop_drake.geometry.swept_tree import BodyPair, BodyPairs, Interval, Intervals, SweptTree
+from coop_drake.geometry.swept_tree import BodyPair, Interval, Intervals, SweptTree
 from coop_drake.planning.cells.cells import CellMaker, Region, regions_of
 from coop_drake.planning.cells.graph import Slices
 from coop_drake.tree.component_tree import ComponentTree
@@ -38,18 +38,15 @@ class Witnesses:
     Args:
         tree: The whole team, whose pieces are numbered in the order of components, bodies and shapes.
         swept: Sweeps of the pieces that the question keeps.
-        pairs: Pairs of bodies among them.
         maker: Looks for pairs of round pieces between walls, if such positions were left out.
     """
 
-    def __init__(
-        self, tree: ComponentTree, swept: SweptTree, pairs: BodyPairs, maker: CellMaker | None = None
-    ) -> None:
+    def __init__(self, tree: ComponentTree, swept: SweptTree, maker: CellMaker | None = None) -> None:
         self._maker = maker
         kept = {component.name for component in swept.tree.components}
         names = [c.name for c in tree.components for body in c.bodies for _ in body.shapes]
         self._numbers = [number for number, name in enumerate(names) if name in kept]
-        self._tree, self._swept, self._pairs = tree, swept, pairs
+        self._tree, self._swept = tree, swept
         self._sweeps: dict[tuple[object, ...], Witness | None] = {}
         self._owners = [k for k, c in enumerate(tree.components) for body in c.bodies for _ in body.shapes]
 
@@ -60,7 +57,7 @@ class Witnesses:
 
     def overlaps(self, intervals: Intervals) -> tuple[Witness, ...]:
         """A point that two pieces hold all over a slice; none if no pair is known to overlap."""
-        pair = self._pairs.overlapping(intervals)
+        pair = self._swept.pairs.overlapping(intervals)
         if pair is None:
             return ()
         depth, pieces, point = max(self._common(pair, intervals), key=lambda common: common[0])

@@ -17,9 +17,16 @@ from coop_drake.errors import PlanError
 from coop_drake.geometry.minkowski import FreeSpace, to_polygon
 from coop_drake.geometry.passage import pole
 from coop_drake.geometry.polygons import BoundaryDistance, parts_of
-from coop_drake.geometry.swept_tree import BodyPairs, Intervals, SweptTree
-from coop_drake.planning.cells.cells import CellMaker, FreeBox, Region, end_in, regions_of
-from coop_drake.planning.questions import disc_polygon, ending_at, is_patched, marginal_workspace, nearby
+from coop_drake.geometry.swept_tree import Intervals, SweptTree
+from coop_drake.planning.cells.cells import CellMaker, FreeBox, Region, regions_of
+from coop_drake.planning.questions import (
+    disc_polygon,
+    end_in,
+    ending_at,
+    is_patched,
+    marginal_workspace,
+    nearby,
+)
 from coop_drake.tree.component_tree import nearest_turn, turns_to
 from coop_drake.tree.pose import FloatArray
 
@@ -142,12 +149,11 @@ class Regions:
     Args:
         problem: The question.
         swept: Sweeps of its tree.
-        pairs: Self-collision of its tree.
         margin: Margin that cores keep [m].
     """
 
-    def __init__(self, problem: PlanningProblem, swept: SweptTree, pairs: BodyPairs, margin: float) -> None:
-        self._swept, self._pairs, self._margin = swept, pairs, margin
+    def __init__(self, problem: PlanningProblem, swept: SweptTree, margin: float) -> None:
+        self._swept, self._margin = swept, margin
         self._floor: Polygon | MultiPolygon = problem.workspace
         patched = margin > 0.0 and is_patched(problem, margin)
         self._narrow = marginal_workspace(problem, margin) if patched else None
@@ -181,7 +187,7 @@ class Regions:
         return [] if maker is None else maker.under_cells(box.intervals)
 
     def _maker(self, floor: Polygon | MultiPolygon) -> CellMaker:
-        return CellMaker(self._swept, self._pairs, floor)
+        return CellMaker(self._swept, floor)
 
 
 def _joined(regions: Sequence[Region], box: FreeBox) -> Region | None:

@@ -8,8 +8,7 @@ from math import hypot, inf, isfinite, sqrt
 import numpy as np
 
 from coop_drake.answers.plan import Plan
-from coop_drake.geometry.distances import nearest_fraction
-from coop_drake.geometry.polygons import edges_of, signed_distance
+from coop_drake.geometry.polygons import edges_of, nearest_fraction, signed_distance
 from coop_drake.jit import compiled
 from coop_drake.laws import TransitionGains
 from coop_drake.laws.axis_table import (

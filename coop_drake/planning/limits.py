@@ -9,9 +9,8 @@ from math import inf
 import numpy as np
 from numpy.typing import NDArray
 
-from coop_drake.answers.limits import Refusal, SpeedStatement, TeamLimits, Unit
-from coop_drake.answers.plan import Plan
-from coop_drake.answers.problem import PlanningProblem
+from coop_drake.answers.plan import Plan, Refusal, SpeedStatement, Unit
+from coop_drake.answers.problem import PlanningProblem, TeamLimits
 from coop_drake.errors import TooQuickError
 from coop_drake.laws.ppc import FUNNEL_SHARE, funnel_rate
 from coop_drake.laws.readiness import RATE_TOLERANCE

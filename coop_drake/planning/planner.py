@@ -15,8 +15,8 @@ from shapely.errors import ShapelyError
 
 from coop_drake.answers.budget import Budget
 from coop_drake.answers.digest import problem_digest
-from coop_drake.answers.limits import SLOWEST_AGE
 from coop_drake.answers.plan import (
+    SLOWEST_AGE,
     BeyondLimits,
     Found,
     Infeasible,

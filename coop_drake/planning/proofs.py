@@ -18,7 +18,7 @@ from coop_drake.answers.proof import InfeasibilityProof, OverCell, OverSlice, Wi
 from coop_drake.errors import GeometryError
 from coop_drake.geometry.minkowski import FreeSpace
 from coop_drake.geometry.sweeps import normals
-from coop_drake.geometry.swept_tree import BodyPairs, Interval, Intervals, SweptTree
+from coop_drake.geometry.swept_tree import Interval, Intervals, SweptTree
 from coop_drake.planning.cells.cells import CellMaker, FreeBox, Region
 from coop_drake.planning.cells.exploration import Exploration, ExplorationResult, Verdict, Watch
 from coop_drake.planning.cells.graph import halves
@@ -210,7 +210,7 @@ class Proofs:
         """Write the proof down; return False if that fails, because cells almost touch or geometry fails."""
         question, _ = relaxed(self._problem, chosen)
         exploration = self._exploration(chosen)
-        witnesses = Witnesses(self._problem.tree, exploration.swept, exploration.pairs, exploration.maker)
+        witnesses = Witnesses(self._problem.tree, exploration.swept, exploration.maker)
         proof = slices_proof(question, exploration.slices, exploration.over_leaves(), witnesses)
         if proof is None:
             return False
@@ -496,12 +496,11 @@ def blocked_goal(problem: PlanningProblem) -> tuple[InfeasibilityProof | None, i
     for chosen in dict.fromkeys([(), *[(robot,) for robot in robots], tuple(robots)]):
         question = relaxed(problem, chosen)[0]
         swept, floor = SweptTree(question.tree), _floor_at_goal(question)
-        pairs = BodyPairs(swept)
         beyond = goal_beyond_limits(question) is not None
-        boxes, made = ([], 0) if beyond else _blocked(question, CellMaker(swept, pairs, floor))
+        boxes, made = ([], 0) if beyond else _blocked(question, CellMaker(swept, floor))
         slices += made
         if boxes or beyond:
-            proof = blocked_goal_proof(question, boxes, floor, Witnesses(problem.tree, swept, pairs))
+            proof = blocked_goal_proof(question, boxes, floor, Witnesses(problem.tree, swept))
             if proof is not None:
                 return proof, slices
     return None, slices

@@ -13,12 +13,12 @@ from numpy.typing import NDArray
 from shapely import MultiPolygon, Polygon
 from shapely.geometry.base import BaseGeometry
 
-from coop_drake.answers.limits import TeamLimits
-from coop_drake.answers.problem import ROUNDING, PlanningProblem, at_goal, goal_box
+from coop_drake.answers.problem import ROUNDING, PlanningProblem, TeamLimits, at_goal, goal_box
 from coop_drake.errors import GeometryError, PlanError
 from coop_drake.geometry.minkowski import FreeSpace, components, to_polygon
-from coop_drake.geometry.polygons import parts_of, polygon_rings
+from coop_drake.geometry.polygons import BoundaryDistance, parts_of, polygon_rings
 from coop_drake.geometry.sweeps import normals
+from coop_drake.geometry.swept_tree import Intervals
 from coop_drake.tree.component_tree import Component, ComponentTree, TreeJoint, nearest_turn
 from coop_drake.tree.pose import FloatArray
 
@@ -308,3 +308,57 @@ def within_limits(problem: PlanningProblem) -> PlanningProblem:
     beyond = known & ((end[3:] < lower) | (end[3:] > upper))
     end[3:] = np.where(beyond, 0.5 * (lower + upper), end[3:])
     return ending_at(problem, end)
+
+
+# Where a transport ends within its goal, if not in its middle: that is in collision, or beyond a limit.
+
+LEAST_END_SHARE = 0.1
+"""Share of a tolerance about an end that a cell leaves at least, so that a team can come to rest [-]."""
+
+_END_FAN = (
+    np.array([0.25, 0.5, 0.75])[:, None, None] * normals(np.linspace(0.0, 2.0 * np.pi, 16, endpoint=False))
+).reshape(-1, 2)
+"""Positions within a tolerance of 1 that are tried, shape (48, 2) [-]."""
+
+
+def end_in(problem: PlanningProblem, intervals: Intervals, boundary: BoundaryDistance) -> FloatArray | None:
+    """A configuration of the goal in a cell that is free, its middle if possible; None if there is no room.
+
+    Args:
+        problem: The question.
+        intervals: The cell's intervals of (theta, q...).
+        boundary: Distance from the boundary of its positions.
+
+    Returns:
+        z, theta as in the intervals, joints without a goal in the middle of theirs, shape (3 + n,) [m, rad].
+    """
+    place, values = _place_in(problem, boundary), list[float]()
+    goals, circular = (float(problem.goal_pose[2]), *problem.goal_joints), problem.tree.circular
+    for (a, b), (low, high), goal, periodic in zip(
+        intervals, goal_box(problem), goals, circular, strict=True
+    ):
+        middle = 0.5 * (a + b)
+        if goal is None:
+            values.append(middle)
+            continue
+        turns = middle + nearest_turn(goal - middle) - goal if periodic else 0.0
+        lower, upper = max(a, low + turns), min(b, high + turns)
+        if lower <= goal + turns <= upper:
+            values.append(goal + turns)
+        elif upper - lower >= LEAST_END_SHARE * (high - low) > 0.0:
+            values.append(0.5 * (lower + upper))
+    return None if place is None or len(values) < len(intervals) else np.array([*place, *values])
+
+
+def _place_in(problem: PlanningProblem, boundary: BoundaryDistance) -> FloatArray | None:
+    """The goal's position if it is held, else the one within the tolerance that has the most room."""
+    goal, room = problem.goal_pose[:2], problem.position_tolerance
+    depth = float(boundary.batch(goal[None])[0])
+    if depth > 0.0:
+        return goal
+    if depth < -room:
+        return None
+    places = goal + room * _END_FAN
+    left = np.minimum(boundary.batch(places), room - np.hypot(*(places - goal).T))
+    best = int(np.argmax(left))
+    return places[best] if left[best] >= LEAST_END_SHARE * room else None

@@ -11,9 +11,8 @@ import numpy as np
 import shapely
 from shapely import Polygon
 
-from coop_drake.answers.limits import TeamLimits
 from coop_drake.answers.plan import Cell, MixedCell, Plan
-from coop_drake.answers.problem import PlannerSettings, PlanningProblem
+from coop_drake.answers.problem import PlannerSettings, PlanningProblem, TeamLimits
 from coop_drake.answers.proof import OverCell, OverSlice
 from coop_drake.laws.gains import FixedGains, GainSet
 from coop_drake.planning.cells.cells import FreeBox, Region

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
-from functools import partial
+from functools import cached_property, partial
 from itertools import product
 
 import numpy as np
@@ -13,7 +13,7 @@ from shapely.errors import ShapelyError
 
 from coop_drake.answers.problem import PlanningProblem, at_goal, goal_box
 from coop_drake.errors import GeometryError
-from coop_drake.geometry.swept_tree import BodyPairs, SweptTree
+from coop_drake.geometry.swept_tree import SweptTree
 from coop_drake.planning.boxes import Certifier
 from coop_drake.planning.cells.cells import FreeBox
 from coop_drake.planning.channel import Channel, CoveredPath, Regions, make_channel
@@ -108,8 +108,6 @@ class SampledSearch:
 
     def __init__(self, problem: PlanningProblem, route: FloatArray | None = None) -> None:
         self._problem = problem
-        self._swept = SweptTree(problem.tree)
-        self._pairs = BodyPairs(self._swept)
         self._scale = configuration_scale(problem.tree)
         self._hierarchy = SubsystemHierarchy(problem, route)
         self._start_inside = problem.workspace.contains(exact_footprint(problem.tree, problem.start))
@@ -311,7 +309,7 @@ class SampledSearch:
     ) -> CoveredPath | None:
         """Cover a path with boxes that keep a margin."""
         workspace = marginal_workspace(self._problem, margin)
-        certifier = Certifier(self._swept, self._pairs, workspace, self._scale, margin)
+        certifier = Certifier(self._problem.tree, workspace, self._scale, margin)
         report = None if progress is None else (lambda fraction: progress(margin, fraction))
         boxes = certifier.boxes(path, report, longest=longest, smallest=smallest)
         self.slices += certifier.trials
@@ -319,13 +317,18 @@ class SampledSearch:
             return None
         return CoveredPath(path, margin, partial(self._channel, boxes, path, margin), self.another)
 
+    @cached_property
+    def _swept(self) -> SweptTree:
+        """Sweeps for the channels of all paths."""
+        return SweptTree(self._problem.tree)
+
     def _channel(self, boxes: Sequence[FreeBox], path: FloatArray, margin: float) -> Channel:
         """Boxes along a path with all positions that are free for them.
 
         Raises:
             GeometryError: If geometry fails.
         """
-        regions = Regions(self._problem, self._swept, self._pairs, margin)
+        regions = Regions(self._problem, self._swept, margin)
         made = [regions.around(box) for box in boxes]
         free = [box for box in made if box is not None]
         if len(free) < len(boxes):

@@ -328,7 +328,7 @@ def search_by_cells(
     if outcome.verdict is not Verdict.INFEASIBLE:
         reason = outcome.verdict.explanation(outcome.slices)
         return NoChannel(False, reason, mixed=exploration.undecided(outcome.path)), report
-    witnesses = Witnesses(problem.tree, exploration.swept, exploration.pairs, exploration.maker)
+    witnesses = Witnesses(problem.tree, exploration.swept, exploration.maker)
     proof = slices_proof(problem, exploration.slices, exploration.over_leaves(), witnesses)
     if proof is None:
         return NoChannel(False, "a proof of infeasibility was found but cannot be written down"), report

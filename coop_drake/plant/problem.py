@@ -15,8 +15,7 @@ from pydrake.systems.framework import DiagramBuilder
 from shapely import LineString, Point, Polygon, get_coordinates
 from shapely.geometry.base import BaseGeometry
 
-from coop_drake.answers.limits import TeamLimits
-from coop_drake.answers.problem import PlanningProblem, object_radius
+from coop_drake.answers.problem import PlanningProblem, TeamLimits, object_radius
 from coop_drake.errors import ScenarioError
 from coop_drake.plant.chain import limits_of
 from coop_drake.plant.component_tree import base_points, read_component_tree

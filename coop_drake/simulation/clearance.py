@@ -13,12 +13,16 @@ import numpy as np
 from shapely import Polygon
 
 from coop_drake.errors import GeometryError
-from coop_drake.geometry.distances import meets_ring, squared_distance, squared_ring_distance
-from coop_drake.geometry.polygons import edges_of, signed_distance
+from coop_drake.geometry.polygons import (
+    edges_of,
+    meets_ring,
+    signed_distance,
+    squared_distance,
+    squared_ring_distance,
+)
 from coop_drake.jit import compiled
-from coop_drake.tree.component_tree import ComponentTree
+from coop_drake.tree.component_tree import ComponentTree, TeamArrays, moved, place_into
 from coop_drake.tree.pose import FloatArray
-from coop_drake.tree.team_arrays import TeamArrays, moved, place_into
 
 
 @compiled(borrows=True)
@@ -178,5 +182,5 @@ class TeamClearance:
         pairs = self.team.pairs
         if not len(pairs):
             return "no two bodies"
-        first, second = (self._names[piece] for piece in pairs[pair])
+        first, second = (self._names[piece] for piece in pairs[pair, :2])
         return f"{first} and {second}"

@@ -9,10 +9,9 @@ from math import hypot, sqrt
 import numpy as np
 from shapely import LineString, Point
 
-from coop_drake.answers.limits import SLOWEST_AGE, Refusal, SpeedStatement, TeamLimits, Unit
-from coop_drake.answers.plan import Plan
+from coop_drake.answers.plan import SLOWEST_AGE, Plan, Refusal, SpeedStatement, Unit
 from coop_drake.answers.plan_file import other_age
-from coop_drake.answers.problem import PlanningProblem
+from coop_drake.answers.problem import PlanningProblem, TeamLimits
 from coop_drake.errors import RefusalError
 from coop_drake.laws import GainSet, ScheduledGains, TransitionGains, transition_gains
 from coop_drake.laws.gains import IDEAL_AGE, RestCondition, schedule_of

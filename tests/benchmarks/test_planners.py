@@ -17,7 +17,7 @@ from benchmarks.planner.ours import Planned, plan_repeatedly
 from benchmarks.planner.stages import STAGES, without_stage
 from benchmarks.questions.peers import PeerRun, fault_of, run_ompl, run_trees
 from coop_drake.planning.sampling.collision import grid_for_team, is_free
-from coop_drake.tree.team_arrays import team_arrays
+from coop_drake.tree.component_tree import team_arrays
 
 EASY = first_question()
 STILL = np.zeros((0, 5))

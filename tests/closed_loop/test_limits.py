@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from coop_drake.answers import BeyondLimits, save_plan
-from coop_drake.answers.limits import TeamLimits
+from coop_drake.answers.problem import TeamLimits
 from coop_drake.answers.speeds import peak_speeds
 from coop_drake.errors import RefusalError
 from coop_drake.laws import FixedGains, ScheduledGains

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from shapely import LineString, MultiPoint, Point, Polygon, box
 from shapely.affinity import rotate
 
-from coop_drake.geometry.distances import separated
+from coop_drake.geometry.polygons import separated
 from coop_drake.geometry.sweeps import (
     circumscribed,
     closed_directions,
@@ -23,7 +23,7 @@ from coop_drake.geometry.sweeps import (
     under_revolute,
 )
 from coop_drake.geometry.swept_tree import inscribed
-from coop_drake.tree.team_arrays import place
+from coop_drake.tree.component_tree import place
 from tests.support.trees import trees
 
 SQUARE = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])

@@ -16,7 +16,7 @@ from coop_drake.answers.digest import problem_digest
 from coop_drake.errors import GeometryError, PlanError
 from coop_drake.geometry.polygons import polygon_rings
 from coop_drake.geometry.sweeps import following, over_piece
-from coop_drake.geometry.swept_tree import BodyPairs, SweptTree
+from coop_drake.geometry.swept_tree import SweptTree
 from coop_drake.laws import ScheduledGains
 from coop_drake.planning import sampled_search
 from coop_drake.planning.boxes import PairSweeps, box_arrays, box_clearance, sweeps_apart, swept_piece
@@ -58,7 +58,7 @@ from coop_drake.planning.sampling.routes import MANY_CORNERS, disc_route, local_
 from coop_drake.planning.sampling.sampler import Sampler, SubsystemHierarchy
 from coop_drake.planning.sampling.trees import SampledRegion, add, draw, empty_tree, nearest
 from coop_drake.planning.search import find_channel, find_path
-from coop_drake.tree.team_arrays import place, team_arrays
+from coop_drake.tree.component_tree import place, team_arrays
 from coop_drake.verification import verify_plan
 from tests.planning.test_search import rod_problem
 from tests.support.cases import case, transport, warehouse
@@ -286,15 +286,14 @@ def test_a_box_has_the_clearance_of_its_cell(data: st.DataObject) -> None:
     tree = data.draw(trees())
     intervals = data.draw(slices_of(tree))
     swept = SweptTree(tree)
-    pairs = BodyPairs(swept)
     # Sweeps reach a little further than the team, and clearances are known within the reach of the grid.
-    boxes, grid = box_arrays(swept, pairs), grid_inside(room(), 2.0 * tree.reach)
+    boxes, grid = box_arrays(swept.tree), grid_inside(room(), 2.0 * tree.reach)
     bounds = np.array(intervals)
 
     def clearance(position: np.ndarray) -> float:
         return box_clearance(boxes, grid, bounds[:, 0].copy(), bounds[:, 1].copy(), position, 0, 0, 1e-3)
 
-    regions = CellMaker(swept, pairs, room()).under_cells(intervals)
+    regions = CellMaker(swept, room()).under_cells(intervals)
     for region in regions:
         middle = region.rings[0].mean(axis=0, keepdims=True)
         depth = max(float(other.depths(middle)[0]) for other in regions)
@@ -321,8 +320,7 @@ def test_sweeps_are_those_of_each_piece_and_bodies_touch_where_pairs_do(data: st
     tree = data.draw(trees())
     intervals = data.draw(slices_of(tree))
     swept = SweptTree(tree)
-    pairs = BodyPairs(swept)
-    boxes, bounds = box_arrays(swept, pairs), np.array(intervals)
+    boxes, bounds = box_arrays(swept.tree), np.array(intervals)
     lower, upper = bounds[:, 0].copy(), bounds[:, 1].copy()
     count = len(boxes.pair_sweeps)
     sweeps = PairSweeps(np.zeros(count + 1, np.int64), np.zeros(count))
@@ -334,7 +332,7 @@ def test_sweeps_are_those_of_each_piece_and_bodies_touch_where_pairs_do(data: st
     for k, (piece, stages) in enumerate(boxes.pair_sweeps.tolist()):
         kept = vertices[sweeps.first[k] : sweeps.first[k + 1]]
         assert (kept == over_piece(boxes.team, piece, lower, upper, stages, False)).all()
-    assert sweeps_apart(boxes, sweeps, vertices) == (pairs.touching(intervals) is None)
+    assert sweeps_apart(boxes, sweeps, vertices) == (swept.pairs.touching(intervals) is None)
 
 
 # Paths with clearance: moved from the walls, measured as shapely measures them, and covered on request.

@@ -9,7 +9,7 @@ from shapely import MultiPolygon, Point, Polygon
 from shapely.affinity import scale
 
 from coop_drake.geometry.minkowski import to_polygon
-from coop_drake.geometry.swept_tree import BodyPairs, SweptTree
+from coop_drake.geometry.swept_tree import SweptTree
 from coop_drake.planning.cells.cells import CellMaker, Region
 from tests.support.free_positions import FreePositions, nudges
 from tests.support.shapes import floors
@@ -50,7 +50,7 @@ def test_under_cells_are_free_and_free_space_is_in_over_cells(data: st.DataObjec
     workspace = scale(data.draw(floors()), size, size, origin=(0.0, 0.0))
     random = np.random.default_rng(data.draw(st.integers(0, 1000)))
     swept = SweptTree(tree)
-    maker = CellMaker(swept, BodyPairs(swept), workspace)
+    maker = CellMaker(swept, workspace)
     under, over = union(maker.under_cells(intervals)), union(maker.over_cells(intervals))
     for z in configurations(intervals, seed=int(random.integers(1 << 30)), count=ANGLES):
         exact = FreePositions(tree, workspace, z[2:])
@@ -87,7 +87,7 @@ def near_boundary(shape: MultiPolygon, random: np.random.Generator, count: int) 
 def test_pairs_judge_like_exact_footprints(data: st.DataObject) -> None:
     tree = data.draw(trees(robots=(2, 3)))
     intervals = data.draw(slices_of(tree))
-    pairs = BodyPairs(SweptTree(tree))
+    pairs = SweptTree(tree).pairs
     touching, overlapping = pairs.touching(intervals), pairs.overlapping(intervals)
     for z in configurations(intervals, seed=3, count=10):
         bodies = body_footprints(tree, z)
@@ -104,7 +104,7 @@ def test_halving_never_loosens(data: st.DataObject) -> None:
     tree = data.draw(trees())
     intervals = data.draw(slices_of(tree))
     swept = SweptTree(tree)
-    maker = CellMaker(swept, BodyPairs(swept), room())
+    maker = CellMaker(swept, room())
     axis = data.draw(st.integers(0, len(intervals) - 1))
     lower, upper = intervals[axis]
     half = (*intervals[:axis], (lower, 0.5 * (lower + upper)), *intervals[axis + 1 :])

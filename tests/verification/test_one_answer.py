@@ -7,7 +7,7 @@ import pytest
 from shapely import box
 
 from coop_drake.answers.digest import problem_digest
-from coop_drake.answers.limits import SLOWEST_AGE, Refusal
+from coop_drake.answers.plan import SLOWEST_AGE, Refusal
 from coop_drake.answers.problem import PlanningProblem
 from coop_drake.errors import RefusalError
 from coop_drake.laws import ScheduledGains

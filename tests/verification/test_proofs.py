@@ -123,7 +123,7 @@ def test_a_cut_through_free_space_is_refused():
     question, _ = relaxed(feasible, ())
     exploration = Exploration(question)
     exploration.run(24)
-    witnesses = Witnesses(feasible.tree, exploration.swept, exploration.pairs)
+    witnesses = Witnesses(feasible.tree, exploration.swept)
     leaves = exploration.over_leaves()
     assert slices_proof(question, exploration.slices, leaves, witnesses) is None
     far = replace(question, goal_pose=np.array([50.0, 50.0, 0.0]))

@@ -14,8 +14,8 @@ from shapely import MultiPolygon, Polygon
 from coop_drake.answers.plan import MixedCell
 from coop_drake.answers.problem import PlanningProblem, goal_box
 from coop_drake.geometry.minkowski import shared, to_polygon
-from coop_drake.geometry.swept_tree import BodyPairs, Intervals, SweptTree
-from coop_drake.planning.cells.cells import CellMaker, FreeBox, Region, end_in
+from coop_drake.geometry.swept_tree import Intervals, SweptTree
+from coop_drake.planning.cells.cells import CellMaker, FreeBox, Region
 from coop_drake.planning.cells.graph import (
     CellGraph,
     GraphCell,
@@ -27,6 +27,7 @@ from coop_drake.planning.cells.graph import (
     share_facet,
 )
 from coop_drake.planning.duration import SETTLING_TIME
+from coop_drake.planning.questions import end_in
 from coop_drake.tree.component_tree import axis_levers
 
 # 1. Slices: those of MIXED cells first. Only if the path has none, those of GUIDE cells.
@@ -401,10 +402,9 @@ class Subdivision(ABC):
         self._problem, self._watch = problem, watch
         self._question, self._paused = question, False
         self.swept = SweptTree(problem.tree)
-        self.pairs = BodyPairs(self.swept)
         self.slices = Slices(problem.tree, problem.settings.slice_overlap, printed=printed)
         floor = problem.workspace if workspace is None else workspace
-        self.maker = CellMaker(self.swept, self.pairs, floor, squeezing=not printed)
+        self.maker = CellMaker(self.swept, floor, squeezing=not printed)
         self.finest = finest_widths(problem)
         self._robots = tuple(sorted({joint.robot for joint in problem.tree.joints}))
         self._tell(ExplorationBegan(question, self._robots))

@@ -13,19 +13,19 @@ from typing import NamedTuple
 import numpy as np
 from shapely import MultiPolygon, Polygon
 
-from coop_drake.geometry.distances import (
+from coop_drake.geometry.minkowski import FreeSpace
+from coop_drake.geometry.polygons import (
     meets_ring,
+    polygon_rings,
     ray_crosses,
     segments_cross,
     squared_distance,
     squared_ring_distance,
 )
-from coop_drake.geometry.minkowski import FreeSpace
-from coop_drake.geometry.polygons import polygon_rings
 from coop_drake.geometry.sweeps import following
 from coop_drake.jit import compiled
+from coop_drake.tree.component_tree import TeamArrays, place_into
 from coop_drake.tree.pose import FloatArray, IntArray
-from coop_drake.tree.team_arrays import TeamArrays, place_into
 
 # Samples added to a path, so that neighbours are near to each other.
 

@@ -17,9 +17,8 @@ from coop_drake.jit import compiled
 from coop_drake.planning.questions import nearby
 from coop_drake.planning.sampling.band import clearances, improved
 from coop_drake.planning.sampling.collision import densified, first_collision, grid_for_team, is_free
-from coop_drake.tree.component_tree import configuration_scale
+from coop_drake.tree.component_tree import TeamArrays, configuration_scale, moved, place_into
 from coop_drake.tree.pose import FloatArray, IntArray
-from coop_drake.tree.team_arrays import TeamArrays, moved, place_into
 
 if TYPE_CHECKING:
     from scipy.optimize import LinearConstraint
@@ -99,7 +98,7 @@ def wall_contacts(team: TeamArrays, path: FloatArray, edges: FloatArray, near: f
 def body_contacts(team: TeamArrays, path: FloatArray, near: float) -> Contacts:
     """Vertices of bodies near an edge of another body that must not touch; see ``wall_contacts``."""
     vertices, ring, found = _vertices(team, path), _ring_order(team), []
-    for one, other in (*team.pairs, *team.pairs[:, ::-1]):
+    for one, other in (*team.pairs[:, :2], *team.pairs[:, 1::-1]):
         mine, theirs = np.arange(*team.pieces[one, 1:]), np.arange(*team.pieces[other, 1:])
         points, first, last = (
             _Vertices(vertices.places[:, rows], vertices.changes[:, rows])

@@ -12,8 +12,7 @@ from shapely import LineString, MultiPolygon, Point, Polygon
 from shapely.errors import ShapelyError
 
 from coop_drake.answers.problem import PlanningProblem
-from coop_drake.geometry.distances import squared_distance
-from coop_drake.geometry.polygons import component_at, polygon_rings
+from coop_drake.geometry.polygons import component_at, polygon_rings, squared_distance
 from coop_drake.geometry.sweeps import following
 from coop_drake.jit import compiled
 from coop_drake.planning.questions import check_question, relaxed

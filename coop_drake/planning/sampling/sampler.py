@@ -27,9 +27,16 @@ from coop_drake.planning.sampling.trees import (
     joined,
     shortened,
 )
-from coop_drake.tree.component_tree import Body, Component, ComponentTree, ConvexShape, configuration_scale
+from coop_drake.tree.component_tree import (
+    Body,
+    Component,
+    ComponentTree,
+    ConvexShape,
+    TeamArrays,
+    configuration_scale,
+    place,
+)
 from coop_drake.tree.pose import FloatArray
-from coop_drake.tree.team_arrays import TeamArrays, place
 
 # The hierarchy of subsystems that paths are sampled for: a disc, the object, some robots, the whole team.
 
