@@ -15,7 +15,7 @@ from coop_drake.apart.node import MOVES, RETURNS, STANDS, Stillness
 from coop_drake.apart.robot import RobotNode
 from coop_drake.apart.supervisor import SupervisorNode
 from coop_drake.diagram import brakes_of, build_world, control_period
-from coop_drake.diagram.knowledge import hold_of, robot_knowledge
+from coop_drake.diagram.robot_controller import hold_of, robot_knowledge
 from coop_drake.harmonic_maps import HarmonicMap
 from coop_drake.laws.actuators import Brake, braking_effort
 from coop_drake.scenario import Scenario

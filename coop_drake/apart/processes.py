@@ -32,8 +32,8 @@ from coop_drake.apart.team_files import AddressBook, KeyPair, local_book
 from coop_drake.apart.transport import Ends, Network
 from coop_drake.apart.world import Pacing, SampleExchange
 from coop_drake.diagram import brakes_of, build_world, control_period
-from coop_drake.diagram.knowledge import hold_of, robot_knowledge
-from coop_drake.diagram.station import build_station
+from coop_drake.diagram.closed_loop import build_station
+from coop_drake.diagram.robot_controller import hold_of, robot_knowledge
 from coop_drake.errors import CoopDrakeError
 from coop_drake.harmonic_maps import HarmonicMap
 from coop_drake.interrupts import uninterrupted

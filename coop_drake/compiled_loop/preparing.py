@@ -10,8 +10,13 @@ from pydrake.systems.framework import DiagramBuilder
 
 from coop_drake.answers.plan import Plan
 from coop_drake.compiled_loop.arrays import LoopCells, LoopNominal, LoopPlant, LoopTeam
-from coop_drake.diagram.knowledge import arrival_goal, governed_cells, rest_tolerance, robot_knowledge
-from coop_drake.diagram.robot_controller import RobotKnowledge
+from coop_drake.diagram.robot_controller import (
+    RobotKnowledge,
+    arrival_goal,
+    governed_cells,
+    rest_tolerance,
+    robot_knowledge,
+)
 from coop_drake.errors import ScenarioError
 from coop_drake.geometry.polygons import BoundaryDistance
 from coop_drake.harmonic_maps import HarmonicMap, VelocityField

@@ -19,7 +19,7 @@ from coop_drake.diagram.deployment import (
     measurement_waves,
     seed_of,
 )
-from coop_drake.diagram.knowledge import report_periods
+from coop_drake.diagram.robot_controller import report_periods
 from coop_drake.errors import ScenarioError
 from coop_drake.laws.axis_table import first_jumps
 from coop_drake.laws.measurements import NOTHING, channel_rows, whole_periods

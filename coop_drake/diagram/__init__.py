@@ -1,13 +1,18 @@
 """Wiring: one robot's controller, the transport station, the closed loop."""
 
-from coop_drake.diagram.closed_loop import ClosedLoop, build_closed_loop
+from coop_drake.diagram.closed_loop import (
+    ClosedLoop,
+    Loop,
+    TransportStation,
+    build_closed_loop,
+    build_station,
+)
 from coop_drake.diagram.robot_controller import (
     TELEMETRY,
     Replacements,
     RobotKnowledge,
     build_robot_controller,
 )
-from coop_drake.diagram.station import Loop, TransportStation, build_station
 from coop_drake.diagram.world import World, brakes_of, build_world, control_period
 
 __all__ = [

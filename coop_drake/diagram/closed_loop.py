@@ -1,24 +1,240 @@
-"""The closed loop: station, cell planner, and one controller for each robot."""
+"""The closed loop: the simulated team in its station, a cell planner, and one controller for each robot."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
+from math import pi
+from typing import NamedTuple
 
 import numpy as np
-from pydrake.systems.framework import Context, Diagram, DiagramBuilder, System
-from pydrake.systems.primitives import ConstantVectorSource, TrajectorySource
+from pydrake.common.value import AbstractValue
+from pydrake.math import RigidTransform, RotationMatrix
+from pydrake.multibody.plant import Propeller, PropellerInfo
+from pydrake.systems.framework import Context, Diagram, DiagramBuilder, OutputPort, System
+from pydrake.systems.primitives import (
+    ConstantValueSource,
+    ConstantVectorSource,
+    Demultiplexer,
+    Selector,
+    TrajectorySource,
+)
 from pydrake.trajectories import PiecewisePolynomial
 
 from coop_drake.answers.plan import Plan
 from coop_drake.diagram.deployment import DeployedController, deploy
-from coop_drake.diagram.knowledge import hold_of, robot_knowledge
-from coop_drake.diagram.robot_controller import Replacements, build_robot_controller
-from coop_drake.diagram.station import Loop, Outputs, PortRow, build_station
+from coop_drake.diagram.robot_controller import Replacements, build_robot_controller, hold_of, robot_knowledge
 from coop_drake.harmonic_maps import HarmonicMap
+from coop_drake.plant import SeparateTeam, TeamPlant, build_separate_team, build_team_plant, set_configuration
 from coop_drake.plant.team import displacement
 from coop_drake.scenario import Hold, Scenario
-from coop_drake.systems import CellPlanner, HoldSupervisor, robot_record
+from coop_drake.systems import (
+    CellPlanner,
+    HoldSupervisor,
+    TeamSensor,
+    build_selector,
+    build_separate_sensor,
+    robot_record,
+)
+from coop_drake.systems.block import release_all
+from coop_drake.systems.departures import add_departures, tilt_floor
+from coop_drake.tree.pose import FloatArray, IntArray
+
+# The transport station: the simulated team with sensors, actuators and disturbances.
+
+
+@dataclass(frozen=True)
+class TransportStation:
+    """The station and the team inside it.
+
+    Attributes:
+        diagram: The station.
+        team: Its plant, with names for the parts.
+    """
+
+    diagram: Diagram
+    team: TeamPlant
+
+
+def build_station(scenario: Scenario) -> TransportStation:
+    """Build the team's plant as in the scenario, with an actuation and a state port for each robot.
+
+    ======= =========================== ========== =========================================================
+    input   ``robot_<k>_effort``        3 + n_k    base wrench and joint torques of robot k
+    output  ``object_pose``             3          pose of L in W
+    output  ``robot_<k>_state``         2(3+n_k)   z_k and its rate
+    output  ``generalized_acceleration``  3+n      the plant's accelerations, for the log alone; 3 more for
+                                                   each base where robots are trees of their own
+    output  ``query_object``            abstract   geometry, for visualization
+    ======= =========================== ========== =========================================================
+
+    Raises:
+        ScenarioError: The models do not make a team.
+    """
+    builder = DiagramBuilder()
+    team = (build_team_plant if scenario.plant.ideal else build_separate_team)(scenario, builder)
+    plant = team.plant
+    tilt_floor(team, scenario.deployment.floor)
+    states = _measure(builder, team)
+    _drive_robots(builder, team, states)
+    builder.ExportOutput(plant.get_generalized_acceleration_output_port(), "generalized_acceleration")
+    builder.ExportOutput(team.scene_graph.get_query_output_port(), "query_object")
+    return TransportStation(builder.Build(), team)
+
+
+def _measure(builder: DiagramBuilder, team: TeamPlant) -> list[OutputPort]:
+    """Add the sensors of the object's pose and of every robot's own state; return the latter."""
+    names = ["object_pose", *(f"robot_{robot.index}_state" for robot in team.robots)]
+    if isinstance(team, SeparateTeam):
+        sensor = parts = builder.AddNamedSystem("team_sensor", build_separate_sensor(team))
+    else:
+        sensor = builder.AddNamedSystem("team_sensor", TeamSensor(team))
+        parts = builder.AddNamedSystem("measurements", Demultiplexer(sensor.sizes))
+        builder.Connect(sensor.get_output_port(), parts.get_input_port())
+    builder.Connect(team.plant.get_state_output_port(), sensor.GetInputPort("team_state"))
+    for i, name in enumerate(names):
+        builder.ExportOutput(parts.get_output_port(i), name)
+    return [parts.get_output_port(i) for i in range(1, len(names))]
+
+
+def _drive_robots(builder: DiagramBuilder, team: TeamPlant, states: Sequence[OutputPort]) -> None:
+    """Add inputs for the effort of every robot: wrenches in W on the bases, torques on the joints."""
+    plant, efforts = team.plant, builder.AddNamedSystem("efforts", _efforts(team))
+    for i in range(efforts.num_input_ports()):
+        builder.ExportInput(efforts.get_input_port(i), efforts.get_input_port(i).get_name())
+    torques = efforts.GetOutputPort("joint_torques")
+    wrenches = add_departures(builder, team, states, efforts.GetOutputPort("base_wrenches"), torques)
+    thrusters = _add_thrusters(builder, team, with_object=wrenches.size() > 3 * len(team.robots))
+    # Thrusters push along the axes of the poses that they receive. These are the identity, so that they push
+    # along the axes of W, however the bases turn.
+    axes = AbstractValue.Make([RigidTransform()] * plant.num_bodies())
+    world = builder.AddNamedSystem("world_axes", ConstantValueSource(axes))
+    builder.Connect(world.get_output_port(), thrusters.get_body_poses_input_port())
+    builder.Connect(wrenches, thrusters.get_command_input_port())
+    if team.joints:
+        builder.Connect(torques, plant.get_actuation_input_port())
+
+
+def _efforts(team: TeamPlant) -> Selector:
+    """Build the block that sorts the efforts of all robots into wrenches on bases and torques of joints."""
+    sizes = [3 + len(robot.joints) for robot in team.robots]
+    return build_selector(
+        {f"robot_{robot.index}_effort": size for robot, size in zip(team.robots, sizes, strict=True)},
+        {
+            "base_wrenches": [(k, i) for k in range(len(sizes)) for i in range(3)],
+            "joint_torques": [(k, i) for k, size in enumerate(sizes) for i in range(3, size)],
+        },
+    )
+
+
+def _add_thrusters(builder: DiagramBuilder, team: TeamPlant, *, with_object: bool) -> Propeller:
+    """Add Drake's Propeller for the wrenches on bases: thrusts along x and y, a moment about z.
+
+    A base wrench given as a generalized force would move the team in the same way, but the reaction at the
+    grasp could then not be read from the plant. The object may have three thrusters at L of its own, behind
+    those of the bases.
+    """
+    places = [(robot.base_body.index(), np.zeros(3)) for robot in team.robots]
+    if with_object:
+        X_BL = team.object_frame.GetFixedPoseInBodyFrame()
+        places.append((team.object_body.index(), X_BL.translation()))
+    thrusters = [
+        PropellerInfo(body, RigidTransform(R_BP, p_BP), thrust, moment)
+        for body, p_BP in places
+        for R_BP, thrust, moment in (
+            (RotationMatrix.MakeYRotation(0.5 * pi), 1.0, 0.0),
+            (RotationMatrix.MakeXRotation(-0.5 * pi), 1.0, 0.0),
+            (RotationMatrix(), 0.0, 1.0),
+        )
+    ]
+    bases = builder.AddNamedSystem("base_thrusters", Propeller(thrusters))
+    builder.Connect(bases.get_spatial_forces_output_port(), team.plant.get_applied_spatial_force_input_port())
+    return bases
+
+
+# What all loops of a simulated team have in common, and how their ports are read for the log.
+
+
+class PortRow:
+    """The values of many ports in one row.
+
+    Args:
+        root: Context of the whole diagram; every reading is of its present content.
+    """
+
+    def __init__(self, root: Context) -> None:
+        self._root = root
+        self._readers: list[Callable[[], FloatArray]] = []
+        self._size = 0
+
+    def add(self, system: System, output: str) -> IntArray:
+        """Append an output and return its indices in the row."""
+        first = self._size
+        self._readers.append(
+            partial(system.GetOutputPort(output).Eval, system.GetMyContextFromRoot(self._root))
+        )
+        self._size += system.GetOutputPort(output).size()
+        return np.arange(first, self._size)
+
+    def read(self) -> FloatArray:
+        """The present values of all ports."""
+        return np.concatenate([read() for read in self._readers])
+
+
+class Outputs(NamedTuple):
+    """Where in a row of ports the outputs stand of robots and supervisor, wherever these are computed.
+
+    Attributes:
+        robots: For every robot the places of its outputs, by their names in ``robot_record``.
+        supervisor: The same for the supervisor, by the names in ``supervisor_record``.
+        efforts: What the actuators of every robot give.
+    """
+
+    robots: Sequence[Mapping[str, IntArray]]
+    supervisor: Mapping[str, IntArray]
+    efforts: Sequence[IntArray]
+
+
+@dataclass(frozen=True)
+class Loop(ABC):
+    """A simulated team with all that drives it.
+
+    Attributes:
+        diagram: The Diagram of everything.
+        station: The simulated team.
+        plan: The plan that is followed.
+        start: Where the team stands at first, shape (3 + n,) [m, rad].
+    """
+
+    diagram: Diagram
+    station: TransportStation
+    plan: Plan
+    start: FloatArray
+
+    @property
+    def team(self) -> TeamPlant:
+        """The simulated team."""
+        return self.station.team
+
+    def create_context(self) -> Context:
+        """Create a context of a team at rest."""
+        context = self.diagram.CreateDefaultContext()
+        team = self.team
+        set_configuration(team, team.plant.GetMyMutableContextFromRoot(context), self.start)
+        return context
+
+    @abstractmethod
+    def outputs(self, ports: PortRow) -> Outputs:
+        """Add the outputs of robots and supervisor to a row, and return where they stand."""
+
+    def release(self) -> None:
+        """Free all memory after the last context is gone; no part of the loop may be used any more."""
+        release_all(self.diagram)
+
+
+# The station with cell planner, controllers and supervisor.
 
 
 @dataclass(frozen=True)

@@ -9,9 +9,9 @@ import numpy as np
 from pydrake.systems.framework import Context, DiagramBuilder
 
 from coop_drake.answers.plan import Plan
+from coop_drake.diagram.closed_loop import Loop, Outputs, PortRow, build_station
 from coop_drake.diagram.deployment import Body, build_body, effort_limits
-from coop_drake.diagram.knowledge import hold_of
-from coop_drake.diagram.station import Loop, Outputs, PortRow, build_station
+from coop_drake.diagram.robot_controller import hold_of
 from coop_drake.errors import ScenarioError
 from coop_drake.laws.actuators import Brake, braking_damping
 from coop_drake.plant import TeamPlant

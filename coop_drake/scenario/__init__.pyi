@@ -1,4 +1,3 @@
-from .assembly import Assembly, RobotAssembly, assemble
 from .deployment import (
     ActuatorLimits,
     BlockedWheels,
@@ -17,7 +16,7 @@ from .deployment import (
     Waves,
     WheelSlip,
 )
-from .directives import package_map
+from .directives import Assembly, RobotAssembly, assemble, package_map
 from .load import dump_gains, dump_scenario, load_scenario, with_gains
 from .model import (
     Control,

@@ -11,8 +11,8 @@ from shapely import LineString, Polygon, STRtree
 from shapely.validation import explain_validity
 
 from coop_drake.errors import ScenarioError
-from coop_drake.scenario.assembly import assemble
 from coop_drake.scenario.deployment import ALL_ROBOTS, JointFriction
+from coop_drake.scenario.directives import assemble
 from coop_drake.scenario.model import Scenario, Workspace
 
 Ring = Sequence[tuple[float, float]]

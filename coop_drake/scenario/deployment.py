@@ -3,11 +3,12 @@
 This file holds the values alone; :mod:`coop_drake.scenario.checks` refuses values that do not fit
 together. Three files apply them: :mod:`coop_drake.diagram.deployment` puts blocks between every controller
 and the plant, :mod:`coop_drake.systems.departures` has the forces of the world for both loops, and
-:mod:`coop_drake.diagram.knowledge` makes the controllers' model of the team, in which ``mass_error`` acts. A
-new departure is a field here, a block there, tests in ``tests/diagram/test_deployment.py``, a mild and a
-harsh case in ``tests/closed_loop/test_departures.py``, a row of ``docs/how_to/deployment.md``, and
-``docs/reference/scenario.md``, which ``python -m docs.generate`` writes. The compiled loop takes departures
-of robots from ``coop_drake/compiled_loop/running.py``, and refuses those that it does not know.
+:mod:`coop_drake.diagram.robot_controller` makes the controllers' model of the team, in which
+``mass_error`` acts. A new departure is a field here, a block there, tests in
+``tests/diagram/test_deployment.py``, a mild and a harsh case in ``tests/closed_loop/test_departures.py``, a
+row of ``docs/how_to/deployment.md``, and ``docs/reference/scenario.md``, which ``python -m docs.generate``
+writes. The compiled loop takes departures of robots from ``coop_drake/compiled_loop/running.py``, and refuses
+those that it does not know.
 """
 
 from dataclasses import dataclass, field, fields, replace

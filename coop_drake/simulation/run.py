@@ -18,7 +18,7 @@ from coop_drake.answers.log import SimulationLog
 from coop_drake.answers.plan import Plan
 from coop_drake.answers.plan_file import plan_digest
 from coop_drake.diagram import Loop, Replacements, World, build_closed_loop
-from coop_drake.diagram.knowledge import arrival_goal
+from coop_drake.diagram.robot_controller import arrival_goal
 from coop_drake.geometry.polygons import BoundaryDistance
 from coop_drake.harmonic_maps import HarmonicMap
 from coop_drake.laws import readiness

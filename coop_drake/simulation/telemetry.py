@@ -14,7 +14,7 @@ from pydrake.systems.framework import Context
 
 from coop_drake.answers.log import SimulationLog
 from coop_drake.answers.plan import Plan
-from coop_drake.diagram.station import Loop, PortRow
+from coop_drake.diagram.closed_loop import Loop, PortRow
 from coop_drake.geometry.polygons import BoundaryDistance, signed_distance
 from coop_drake.laws import total_wrench
 from coop_drake.simulation.clearance import TeamClearance, team_distances

@@ -15,7 +15,7 @@ from coop_drake.apart.robot import StampCheck, certified_age
 from coop_drake.apart.supervisor import SPARE
 from coop_drake.cli.task import read_task
 from coop_drake.diagram import build_station, control_period
-from coop_drake.diagram.knowledge import robot_knowledge
+from coop_drake.diagram.robot_controller import robot_knowledge
 from coop_drake.errors import ScenarioError
 from coop_drake.scenario import Control, Deployment, Hold, Measurements, Messages, RobotDepartures, Silence
 from coop_drake.scenario.deployment import ActuatorLimits, Deafness

@@ -12,7 +12,7 @@ from coop_drake.apart import RobotNode
 from coop_drake.apart.messages import Place, Switch
 from coop_drake.chain import plan
 from coop_drake.diagram import build_station
-from coop_drake.diagram.knowledge import robot_knowledge
+from coop_drake.diagram.robot_controller import robot_knowledge
 from coop_drake.scenario import load_scenario
 from coop_drake.simulation import build_maps, simulate
 from tests.support.cli import invoke

@@ -12,7 +12,7 @@ from coop_drake.answers import Found
 from coop_drake.answers.budget import Budget
 from coop_drake.cli import app
 from coop_drake.cli.task import read_task
-from coop_drake.diagram.knowledge import axis_levels
+from coop_drake.diagram.robot_controller import axis_levels
 from coop_drake.planning.planner import plan
 from coop_drake.plant.facts import budget_of, scenario_budgets
 from coop_drake.robustness.alarms import unseen_of

@@ -18,7 +18,7 @@ from coop_drake.compiled_loop.loop import update
 from coop_drake.compiled_loop.robots import compute, heard_cell
 from coop_drake.compiled_loop.running import believed, departures_of, memory_of, nominal_of
 from coop_drake.compiled_loop.watching import left_by_all
-from coop_drake.diagram import station as stations
+from coop_drake.diagram import closed_loop as stations
 from coop_drake.jit import compiled
 from coop_drake.laws.actuators import lag_behind
 from coop_drake.laws.axis_table import bounds_of

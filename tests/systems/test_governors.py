@@ -11,7 +11,7 @@ from pydrake.systems.framework import DiagramBuilder
 
 from coop_drake import systems
 from coop_drake.answers.budget import AxisTracking
-from coop_drake.diagram.knowledge import robot_knowledge
+from coop_drake.diagram.robot_controller import robot_knowledge
 from coop_drake.laws import funnel_bounds, governed_acceleration, governor_velocity
 from coop_drake.laws.governor import VELOCITY_STEP, energy_margin, tracking_energy
 from coop_drake.laws.nominal import carry_axes, nominal_flow

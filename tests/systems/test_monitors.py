@@ -8,7 +8,7 @@ import pytest
 from pydrake.systems.analysis import Simulator
 
 from coop_drake.diagram import build_station
-from coop_drake.diagram.knowledge import hold_of, robot_knowledge
+from coop_drake.diagram.robot_controller import hold_of, robot_knowledge
 from coop_drake.errors import PlanError
 from coop_drake.laws.readiness import FAR, ArrivalGoal, arrival_margin, mean_samples
 from coop_drake.scenario import Deployment, Hold, Measurements
