@@ -135,7 +135,7 @@ def verify_run(
         RefusalError: Names the first claim that does not hold; of a log array, index and time.
     """
     from coop_drake.answers.log import SimulationLog
-    from coop_drake.answers.plan_file import load_plan
+    from coop_drake.answers.plan import load_plan
     from coop_drake.plant import planning_problem, run_setup
     from coop_drake.plant.facts import scenario_budgets
     from coop_drake.verification import verify_plan

@@ -19,7 +19,7 @@ from PIL import Image
 
 import coop_drake
 from coop_drake.answers import save_plan
-from coop_drake.answers.digest import problem_digest
+from coop_drake.answers.document import problem_digest
 from coop_drake.cli import app, doctor, options, show
 from coop_drake.cli.app import _OLD_NAMES, _PANELS
 from coop_drake.cli.options import complete_gains, complete_scenario

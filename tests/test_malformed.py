@@ -17,7 +17,7 @@ import typer
 from pydrake.systems.framework import DiagramBuilder
 
 from coop_drake.answers import load_plan, save_plan
-from coop_drake.answers.digest import problem_digest
+from coop_drake.answers.document import problem_digest
 from coop_drake.answers.log import SimulationLog
 from coop_drake.answers.proof import save_proof
 from coop_drake.cli import app, simulate, verify

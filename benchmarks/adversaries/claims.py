@@ -21,7 +21,7 @@ from coop_drake import load_scenario
 from coop_drake.answers import Found
 from coop_drake.answers.budget import LIMITS, SCALED
 from coop_drake.answers.document import Document as File
-from coop_drake.answers.plan_file import plan_document, read_plan
+from coop_drake.answers.plan import plan_document, read_plan
 from coop_drake.errors import PlanError, RefusalError
 from coop_drake.planning.planner import plan
 from coop_drake.plant import planning_problem

@@ -19,7 +19,7 @@ from benchmarks.adversaries.plans import PLAN_ALTERATIONS
 from benchmarks.adversaries.proof_truth import proof_fault
 from benchmarks.adversaries.proofs import PROOF_ALTERATIONS
 from coop_drake.answers import Found, Infeasible, PlanningProblem, save_plan
-from coop_drake.answers.digest import content_digest
+from coop_drake.answers.document import content_digest
 from coop_drake.answers.proof import save_proof
 from coop_drake.checking import RefusedError, check
 from coop_drake.laws import ScheduledGains

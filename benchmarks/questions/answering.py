@@ -29,7 +29,7 @@ from coop_drake.answers import (
     PlanningResult,
     Undecided,
 )
-from coop_drake.answers.digest import content_digest
+from coop_drake.answers.document import content_digest
 from coop_drake.answers.plan import SearchReport
 from coop_drake.campaign.plans import versions
 from coop_drake.campaign.records import Batch, CampaignFolder, Task, Work

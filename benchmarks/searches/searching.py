@@ -17,7 +17,7 @@ import yaml
 from benchmarks.searches.departures import SCALED, BoundedDepartures, departures_at, largest_multiple
 from benchmarks.searches.findings import BreakingPoint, Finding
 from coop_drake.answers.budget import Budget
-from coop_drake.answers.digest import content_digest
+from coop_drake.answers.document import content_digest
 from coop_drake.campaign.file import LARGEST_SEED, Campaign, Count, Plain, Runs, Seed, check_keys
 from coop_drake.campaign.plans import Plans, versions
 from coop_drake.campaign.records import Batch, CampaignFolder, RunRecord, Task, Work

@@ -9,9 +9,10 @@ from .plan import (
     SearchReport,
     Transition,
     Undecided,
+    load_plan,
+    save_plan,
     table_1,
 )
-from .plan_file import load_plan, save_plan
 from .problem import PlannerSettings, PlanningProblem
 
 __all__ = [

@@ -1,4 +1,4 @@
-"""JSON documents that hold a dataclass: written in one way only, and read with every value checked."""
+"""JSON documents that hold a dataclass: their regions and digests, and how they are written and read."""
 
 from __future__ import annotations
 
@@ -7,13 +7,166 @@ import math
 import re
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
+from hashlib import sha256
 from pathlib import Path
-from typing import Any, NoReturn, TypeVar
+from typing import Annotated, Any, NoReturn, TypeVar
 
-from coop_drake.answers.digest import content_digest
+import numpy as np
+import shapely
+from shapely import Polygon
+
+from coop_drake.answers.problem import PlanningProblem, TeamLimits
 from coop_drake.errors import PlanError, ScenarioError, shortened
 from coop_drake.files import check_readable, write_atomically
-from coop_drake.typed_data import DataError, convert, convert_class
+from coop_drake.geometry.polygons import corners_of
+from coop_drake.tree.component_tree import Component, ComponentTree, ConvexShape, TreeJoint
+from coop_drake.tree.pose import FloatArray
+from coop_drake.typed_data import Codec, DataError, Number, convert, convert_class, to_plain
+
+# Regions in files: the rings of a polygon, without their closing corners.
+
+Pairs = tuple[tuple[Number, Number], ...]
+
+
+def _of_points(least: int) -> Codec:
+    """Return the codec of a list of points, shape (n, 2) [m]."""
+
+    def read(pairs: Pairs) -> FloatArray:
+        if len(pairs) < least:
+            allowed = f"a list of at least {least} {'corners' if least > 2 else 'points'}"
+            raise DataError("", [list(pair) for pair in pairs], allowed)
+        return np.array(pairs, dtype=np.float64)
+
+    return Codec(Pairs, read, np.ndarray.tolist)
+
+
+Ring = Annotated[FloatArray, _of_points(3)]
+
+Corners = Annotated[FloatArray, _of_points(1)]
+"""Corners of a convex polygon, or a single point [m]."""
+
+Points = Annotated[FloatArray, _of_points(2)]
+"""A polyline that a file holds as the list of its points [m]."""
+
+
+@dataclass(frozen=True)
+class Rings:
+    """A polygon as it stands in a file.
+
+    Attributes:
+        outer: Corners of the outer ring [m].
+        holes: Corners of the inner rings [m].
+    """
+
+    outer: Ring
+    holes: tuple[Ring, ...]
+
+
+def _read_region(rings: Rings) -> Polygon:
+    polygon = Polygon(rings.outer, rings.holes)
+    if not polygon.is_valid or polygon.area <= 0.0:
+        reason = shapely.is_valid_reason(polygon)
+        allowed = f"rings that cross neither themselves nor each other, but found: {reason}"
+        raise DataError("", _write_region(polygon), allowed)
+    return polygon
+
+
+def _write_region(polygon: Polygon) -> object:
+    outer, *holes = (corners.tolist() for corners in corners_of(polygon))
+    return {"outer": outer, "holes": holes}
+
+
+Region = Annotated[Polygon, Codec(Rings, _read_region, _write_region)]
+"""A polygon that a file holds as its rings [m]."""
+
+
+# Digests: which question a file answers, and whether its content is still what was written.
+
+DECIMALS = 9
+"""Decimals of a problem's numbers that its digest sees [m, rad]: last bits differ between libraries."""
+
+
+def content_digest(document: Mapping[str, Any]) -> str:
+    """SHA-256 over all of a JSON document but its entry ``digest``, whatever its layout; in hexadecimal."""
+    return _digest({key: value for key, value in document.items() if key != "digest"})
+
+
+def problem_digest(problem: PlanningProblem) -> str:
+    """SHA-256 over what is asked: floor, team, start, goal, tolerances and limits; not how hard to try."""
+    rings = (problem.workspace.exterior, *problem.workspace.interiors)
+    return _digest(
+        {
+            "workspace": [_rounded(shapely.get_coordinates(ring).tolist()) for ring in rings],
+            "team": tree_document(problem.tree),
+            "start": _rounded(problem.start.tolist()),
+            "goal_pose": _rounded(problem.goal_pose.tolist()),
+            "goal_joints": _rounded(list(problem.goal_joints)),
+            "tolerances": _rounded(
+                [
+                    problem.position_tolerance,
+                    problem.angle_tolerance,
+                    *np.atleast_1d(problem.joint_tolerance).tolist(),
+                ]
+            ),
+            **_limits(problem.limits),
+        }
+    )
+
+
+def tree_document(tree: ComponentTree) -> dict[str, Any]:
+    """A component tree as plain data with rounded numbers."""
+    return {
+        "components": [_component(component) for component in tree.components],
+        "sharing_joint": sorted(sorted(pair) for pair in tree.unchecked_pairs),
+    }
+
+
+def _limits(limits: TeamLimits) -> dict[str, Any]:
+    """Limits of speed and of acceleration, if there are any; efforts are not part of the question."""
+    stated, document = to_plain(limits, TeamLimits), {}
+    accelerations = stated.pop("joint_accelerations")
+    del stated["joint_efforts"]
+    if limits.any:
+        document["limits"] = _rounded(list(stated.values()))
+    if np.isfinite(limits.joint_accelerations).any():
+        document["accelerations"] = _rounded(accelerations)
+    return document
+
+
+def _digest(value: Any) -> str:
+    text = json.dumps(value, sort_keys=True, separators=(",", ":"), ensure_ascii=True)
+    return sha256(text.encode()).hexdigest()
+
+
+def _rounded(value: Any) -> Any:
+    """The same nested lists with rounded numbers, without negative zeros."""
+    if isinstance(value, list):
+        return [_rounded(entry) for entry in value]
+    return None if value is None else round(float(value), DECIMALS) + 0.0
+
+
+def _component(component: Component) -> dict[str, Any]:
+    return {
+        "name": component.name,
+        "parent": component.parent,
+        "joint": None if component.joint is None else _joint(component.joint),
+        "bodies": [
+            [body.name, body.robot, [_shape(shape) for shape in body.shapes]] for body in component.bodies
+        ],
+    }
+
+
+def _joint(joint: TreeJoint) -> list[Any]:
+    X = joint.X_PJ
+    numbers = [X.x, X.y, X.angle, joint.sign, *joint.axis, joint.lower, joint.upper]
+    return [joint.name, joint.kind, joint.robot, joint.index, _rounded(numbers)]
+
+
+def _shape(shape: ConvexShape) -> list[Any]:
+    return [_rounded(shape.vertices.tolist()), _rounded(shape.radius)]
+
+
+# Documents: written in one way only, and read with every value checked.
 
 _LARGEST = 1000.0
 """Largest file of a plan or a proof [MB]; those of the shipped scenarios have a few."""

@@ -9,10 +9,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from coop_drake.answers.digest import problem_digest
-from coop_drake.answers.document import Document, write_document
+from coop_drake.answers.document import Corners, Document, Region, problem_digest, write_document
 from coop_drake.answers.problem import PlanningProblem
-from coop_drake.answers.region import Corners, Region
 from coop_drake.typed_data import EXACT, Limits, Vector, to_plain
 
 # A proof of infeasibility: regions that cover all free configurations and keep start and goal apart.

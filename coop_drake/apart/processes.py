@@ -19,8 +19,7 @@ from pydrake.systems.framework import DiagramBuilder
 
 from coop_drake.answers.budget import Budget
 from coop_drake.answers.log import SimulationLog
-from coop_drake.answers.plan import Plan
-from coop_drake.answers.plan_file import plan_digest
+from coop_drake.answers.plan import Plan, plan_digest
 from coop_drake.apart import RESTARTS
 from coop_drake.apart.faults import NO_FAULTS, Faults
 from coop_drake.apart.membership import TOLERATED, Processes

@@ -10,7 +10,7 @@ from typing import Any
 
 import coop_drake
 from coop_drake.answers import Found, Plan, load_plan, save_plan
-from coop_drake.answers.digest import content_digest
+from coop_drake.answers.document import content_digest
 from coop_drake.campaign.variation import Run, Variation
 from coop_drake.errors import PlanError
 from coop_drake.files import cache_folder

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, get_args, get_type_hints
 
 import numpy as np
 
-from coop_drake.answers.digest import content_digest
+from coop_drake.answers.document import content_digest
 from coop_drake.campaign.file import Campaign, Tier
 from coop_drake.campaign.plans import Plans, scenario_content, source_digest
 from coop_drake.campaign.variation import Variation

@@ -12,10 +12,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from coop_drake.answers.digest import content_digest
+from coop_drake.answers.document import content_digest
 from coop_drake.answers.log import SimulationLog
-from coop_drake.answers.plan import Plan
-from coop_drake.answers.plan_file import plan_digest
+from coop_drake.answers.plan import Plan, plan_digest
 from coop_drake.campaign.file import Tier, load_campaign
 from coop_drake.campaign.plans import Maps, Plans, versions
 from coop_drake.campaign.records import Batch, Batching, CampaignFolder, RunRecord, Task

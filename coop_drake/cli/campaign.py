@@ -208,7 +208,7 @@ def _replay(
         ProcessError: The run differs from the one that was counted.
     """
     from coop_drake.answers.log import SimulationLog
-    from coop_drake.answers.plan_file import plan_digest
+    from coop_drake.answers.plan import plan_digest
     from coop_drake.campaign.plans import Plans
     from coop_drake.campaign.runs import RunMaker, record_of_log, run_digest
     from coop_drake.campaign.variation import Variation

@@ -60,7 +60,7 @@ def read_plan(task: Task, path: Path, reporter: Reporter, *, new_gains: bool = F
         PlanError: The file is no plan, or belongs to another scenario.
     """
     from coop_drake.answers import load_plan
-    from coop_drake.answers.plan_file import check_plan_belongs, other_age
+    from coop_drake.answers.plan import check_plan_belongs, other_age
     from coop_drake.planning import reschedule
     from coop_drake.plant.facts import scenario_budgets
     from coop_drake.verification.budget_origin import check_origin

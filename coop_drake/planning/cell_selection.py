@@ -11,7 +11,7 @@ import numpy as np
 from shapely import Polygon
 from shapely.errors import ShapelyError
 
-from coop_drake.answers.digest import problem_digest
+from coop_drake.answers.document import problem_digest
 from coop_drake.answers.plan import Plan
 from coop_drake.answers.problem import PlanningProblem
 from coop_drake.errors import GeometryError, PlanError, StallError, TooQuickError

@@ -14,7 +14,7 @@ import numpy as np
 from shapely.errors import ShapelyError
 
 from coop_drake.answers.budget import Budget
-from coop_drake.answers.digest import problem_digest
+from coop_drake.answers.document import problem_digest
 from coop_drake.answers.plan import (
     SLOWEST_AGE,
     BeyondLimits,

@@ -11,7 +11,7 @@ import numpy as np
 import shapely
 from shapely import Point, Polygon
 
-from coop_drake.answers.digest import problem_digest
+from coop_drake.answers.document import problem_digest
 from coop_drake.answers.plan import Cell, Plan, Transition
 from coop_drake.answers.problem import PlanningProblem, goal_box
 from coop_drake.errors import GeometryError, PlanError, StallError

@@ -11,7 +11,7 @@ from pydrake.multibody.tree import BodyIndex, ForceElementIndex, Joint
 from pydrake.systems.framework import DiagramBuilder
 
 from coop_drake.answers.budget import LIMITS, Budget
-from coop_drake.answers.digest import content_digest, tree_document
+from coop_drake.answers.document import content_digest, tree_document
 from coop_drake.answers.problem import PlanningProblem
 from coop_drake.errors import ScenarioError
 from coop_drake.laws import ScheduledGains

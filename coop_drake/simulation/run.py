@@ -15,8 +15,7 @@ from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorC
 from pydrake.systems.framework import Context, EventStatus
 
 from coop_drake.answers.log import SimulationLog
-from coop_drake.answers.plan import Plan
-from coop_drake.answers.plan_file import plan_digest
+from coop_drake.answers.plan import Plan, plan_digest
 from coop_drake.diagram import Loop, Replacements, World, build_closed_loop
 from coop_drake.diagram.robot_controller import arrival_goal
 from coop_drake.geometry.polygons import BoundaryDistance

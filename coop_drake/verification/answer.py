@@ -10,12 +10,10 @@ from typing import Any
 
 import numpy as np
 
-from coop_drake.answers import plan_file
+from coop_drake.answers import plan as plan_file
 from coop_drake.answers import proof as proof_file
-from coop_drake.answers.digest import content_digest, problem_digest
-from coop_drake.answers.document import Document
-from coop_drake.answers.plan import Plan
-from coop_drake.answers.plan_file import plan_document, same_goal_joints
+from coop_drake.answers.document import Document, content_digest, problem_digest
+from coop_drake.answers.plan import Plan, plan_document, same_goal_joints
 from coop_drake.answers.problem import PlanningProblem
 from coop_drake.answers.proof import InfeasibilityProof, proof_document
 from coop_drake.checking import RefusedError, check

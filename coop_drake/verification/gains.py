@@ -9,8 +9,7 @@ from math import hypot, sqrt
 import numpy as np
 from shapely import LineString, Point
 
-from coop_drake.answers.plan import SLOWEST_AGE, Plan, Refusal, SpeedStatement, Unit
-from coop_drake.answers.plan_file import other_age
+from coop_drake.answers.plan import SLOWEST_AGE, Plan, Refusal, SpeedStatement, Unit, other_age
 from coop_drake.answers.problem import PlanningProblem, TeamLimits
 from coop_drake.errors import RefusalError
 from coop_drake.laws import GainSet, ScheduledGains, TransitionGains, transition_gains

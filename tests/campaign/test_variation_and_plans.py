@@ -13,7 +13,7 @@ from typer.testing import CliRunner
 from benchmarks.app import app
 from benchmarks.searches.searching import Searching
 from benchmarks.study import load_study
-from coop_drake.answers.plan_file import plan_digest
+from coop_drake.answers.plan import plan_digest
 from coop_drake.campaign import file as distributions
 from coop_drake.campaign import plans
 from coop_drake.campaign.execution import client_of

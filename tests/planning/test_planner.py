@@ -12,8 +12,7 @@ import pytest
 from shapely import box
 
 from coop_drake.answers import BeyondLimits, Found, Infeasible, SearchReport, Undecided
-from coop_drake.answers.plan import Refusal
-from coop_drake.answers.plan_file import check_plan, plan_document
+from coop_drake.answers.plan import Refusal, check_plan, plan_document
 from coop_drake.errors import StallError
 from coop_drake.laws import ScheduledGains
 from coop_drake.planning import planner

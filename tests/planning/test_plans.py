@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from shapely import LineString, Point, box
 
-from coop_drake.answers.plan_file import check_plan
+from coop_drake.answers.plan import check_plan
 from coop_drake.errors import PlanError, StallError
 from coop_drake.geometry import BoundaryDistance, PassageFinder
 from coop_drake.laws import FixedGains, ScheduledGains, transition_gains

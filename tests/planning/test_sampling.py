@@ -12,7 +12,7 @@ from shapely import LineString, MultiPolygon, Point, Polygon, box
 
 from benchmarks.planner.family import corridor_problem, crowd_problem, shelf_problem
 from coop_drake.answers import Found, PlannerSettings
-from coop_drake.answers.digest import problem_digest
+from coop_drake.answers.document import problem_digest
 from coop_drake.errors import GeometryError, PlanError
 from coop_drake.geometry.polygons import polygon_rings
 from coop_drake.geometry.sweeps import following, over_piece

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from pydrake.systems.framework import DiagramBuilder
 
-from coop_drake.answers.digest import problem_digest
+from coop_drake.answers.document import problem_digest
 from coop_drake.cli.task import read_task
 from coop_drake.errors import ScenarioError
 from coop_drake.plant import build_robot_plant, build_team_plant, parsing, planning_problem, set_configuration

@@ -8,7 +8,7 @@ import pytest
 import yaml
 from shapely import box
 
-from coop_drake.answers.digest import problem_digest
+from coop_drake.answers.document import problem_digest
 from coop_drake.cli.task import read_task
 from coop_drake.errors import FloorPlanError, ScenarioError
 from coop_drake.scenario import dump_scenario, load_scenario

@@ -6,7 +6,7 @@ from copy import deepcopy
 import numpy as np
 from shapely import Polygon, box, normalize, union_all
 
-from coop_drake.answers.digest import content_digest
+from coop_drake.answers.document import content_digest
 from coop_drake.answers.problem import PlanningProblem
 from coop_drake.laws import ScheduledGains
 from tests.support.cases import team_tree

@@ -18,7 +18,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from coop_drake.answers.digest import content_digest
+from coop_drake.answers.document import content_digest
 
 Place = tuple[Any, ...]
 NO_TEXT = (b"\xff", b"\xc3\x28", b"\xe2\x82", b"\xed\xa0\x80", b"\x80", b"\x00", b"\x1b")

@@ -17,7 +17,7 @@ from benchmarks.adversaries.collisions import Document
 from benchmarks.adversaries.forgeries import forged_proof
 from benchmarks.adversaries.questions import crossing_question
 from benchmarks.adversaries.trial import answered, judged, kind_of, refusal
-from coop_drake.answers.digest import problem_digest
+from coop_drake.answers.document import problem_digest
 from coop_drake.answers.problem import PlanningProblem
 from coop_drake.checking.__main__ import main
 from coop_drake.errors import PlanError, RefusalError

@@ -15,10 +15,8 @@ import numpy as np
 import pytest
 
 from coop_drake.answers.budget import LIMITS
-from coop_drake.answers.digest import problem_digest
-from coop_drake.answers.document import Document
-from coop_drake.answers.plan import Plan
-from coop_drake.answers.plan_file import plan_document, read_plan
+from coop_drake.answers.document import Document, problem_digest
+from coop_drake.answers.plan import Plan, plan_document, read_plan
 from coop_drake.answers.problem import PlanningProblem
 from coop_drake.errors import PlanError, RefusalError
 from coop_drake.laws import ScheduledGains

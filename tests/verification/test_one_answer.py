@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from shapely import box
 
-from coop_drake.answers.digest import problem_digest
+from coop_drake.answers.document import problem_digest
 from coop_drake.answers.plan import SLOWEST_AGE, Refusal
 from coop_drake.answers.problem import PlanningProblem
 from coop_drake.errors import RefusalError

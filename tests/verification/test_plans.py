@@ -10,7 +10,7 @@ from shapely import MultiPoint
 
 from coop_drake.answers import save_plan
 from coop_drake.answers.document import Document
-from coop_drake.answers.plan_file import other_age, read_plan
+from coop_drake.answers.plan import other_age, read_plan
 from coop_drake.checking import plane
 from coop_drake.checking.team import Question, swept
 from coop_drake.errors import PlanError, RefusalError

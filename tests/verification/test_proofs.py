@@ -9,8 +9,7 @@ import pytest
 import shapely
 from shapely import Polygon
 
-from coop_drake.answers.digest import problem_digest
-from coop_drake.answers.document import Document
+from coop_drake.answers.document import Document, problem_digest
 from coop_drake.answers.problem import PlanningProblem
 from coop_drake.answers.proof import read_proof, save_proof
 from coop_drake.errors import PlanError, RefusalError

@@ -25,8 +25,7 @@ from dataclasses import fields, replace
 import numpy as np
 
 from coop_drake.answers.log import SimulationLog
-from coop_drake.answers.plan import Plan
-from coop_drake.answers.plan_file import plan_digest
+from coop_drake.answers.plan import Plan, plan_digest
 from coop_drake.answers.problem import PlanningProblem
 from coop_drake.errors import RefusalError
 from coop_drake.progress import Progress
