@@ -157,8 +157,8 @@ def _digest(module: str, file: Path) -> str:
 @cache
 def compiler_settings() -> str:
     """Return what the last bits of compiled sums depend on: the processor, and numba's settings."""
-    settings = {name: value for name, value in os.environ.items() if name.startswith("NUMBA_")}
-    settings.pop("NUMBA_CACHE_DIR", None)
+    others = {"NUMBA_CACHE_DIR", "NUMBA_NUM_THREADS"}  # No function runs on numba's threads.
+    settings = {key: own for key, own in os.environ.items() if key.startswith("NUMBA_") and key not in others}
     features = llvm.get_host_cpu_features().flatten()
     return repr((llvm.get_host_cpu_name(), features, sorted(settings.items())))
 
