@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from shapely import Polygon, box
 
+from coop_drake.answers.budget import Budget
 from coop_drake.answers.problem import PlannerSettings, PlanningProblem
 from coop_drake.geometry.passage import PassageFinder
 from coop_drake.geometry.sweeps import normals
@@ -14,12 +15,20 @@ from coop_drake.planning.proofs import Proofs
 from coop_drake.tree.component_tree import Body, Component, ComponentTree, ConvexShape, TreeJoint
 from coop_drake.tree.pose import PlanarPose
 
+BUDGET = Budget(
+    control_rate=200.0, delay=0.01, lag=0.005, angle_noise=2e-4, rate_noise=2e-3, position_noise=3e-4,
+    velocity_noise=3e-3, model_error=0.1, acceleration_error=0.1, report_age=0.025, base_force=900.0,
+    grasp_noise=0.01, turn_noise=0.006, bases=((1, 0.0, 0.0),), rotors=(0.1,), dampings=(0.1,),
+    bodies=((0, 3.0, 0.0, 0.0, 0.1, 0), (1, 9.0, 0.0, 0.0, 0.3, 0)),
+)  # fmt: skip
+"""Departures of every kind that a plan can tolerate."""
+
 SLICES = 8
 """Slices of an exploration: its kernels are called in the first one."""
 
 
 def main() -> None:
-    """Plan for a square with one arm on an empty floor, and find a passage around a corner.
+    """Plan for a square with one arm on an empty floor under a budget, and find a passage around a corner.
 
     Together these call every kernel.
     """
@@ -37,7 +46,7 @@ def main() -> None:
         (None,),
         settings=PlannerSettings(margin=0.1),
     )
-    plan(question, ScheduledGains(), gain_set_name="scheduled")
+    plan(question, ScheduledGains(), gain_set_name="scheduled", budget=BUDGET)
     Proofs(question).run(SLICES)
     bent = Polygon([(0.0, 0.0), (3.0, 0.0), (3.0, 1.0), (1.0, 1.0), (1.0, 3.0), (0.0, 3.0)])
     PassageFinder(bent).find((2.5, 0.5), (0.5, 2.5))
