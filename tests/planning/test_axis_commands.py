@@ -1,5 +1,7 @@
 """Bounds of departures and commands of axes hold for every law, noise and error of the model."""
 
+from functools import cache
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -14,7 +16,11 @@ from coop_drake.robustness.nominal_axes import ACCELERATION, COLUMNS, COMMAND, C
 
 BUDGET = Budget(delay=0.01, lag=0.005, angle_noise=0.0015, rate_noise=0.03, model_error=0.2, axis_error=0.35)
 PERIODS, LEAVING = 120, 100
-LOOP = best_loop(BUDGET, weight=0.002)
+
+
+@cache
+def loop():
+    return best_loop(BUDGET, weight=0.002)
 
 
 def bounds(middle, reach, last):
@@ -25,9 +31,9 @@ def bounds(middle, reach, last):
     sets = AxisSets((tube,), 0.0, tube[0, ACCELERATION], last, 0.0, 0.0)
     laws = sets.commands(PERIODS)[:, :, None]
     moving = sets.moving(PERIODS, BUDGET.period).T[:, :, None]
-    found, _ = departing(LOOP, [sets], np.zeros((1, 1, 1)), at_rest(LOOP, 1), LEAVING)
+    found, _ = departing(loop(), [sets], np.zeros((1, 1, 1)), at_rest(loop(), 1), LEAVING)
     own = laws, moving[:, 0], found.entered.T
-    asked, _ = largest_commands(LOOP, *own, nothing_commanded(LOOP, 1), LEAVING)
+    asked, _ = largest_commands(loop(), *own, nothing_commanded(loop(), 1), LEAVING)
     return np.array([found.position[:, 0], found.rate[:, 0], asked[:, 0]])
 
 
@@ -48,7 +54,7 @@ def run(law, error, noise, push, rates=(0.0, 0.0, 0.0)):
     Its departure obeys e'' = (1 + epsilon) (lagging q) + epsilon (lagging L) + push. It begins at rest, but
     for rates: in the two measurements before the beginning, and at the beginning.
     """
-    stiffness, damping = LOOP.tracking.stiffness, LOOP.tracking.damping
+    stiffness, damping = loop().tracking.stiffness, loop().tracking.damping
     e, v, acting, asked = [0.0] * 3, list(rates), 0.0, []
     for own, one, pushed in zip(law, noise, push, strict=True):
         q = -stiffness * (e[-3] + one[0]) - damping * (v[-3] + one[1])
@@ -102,7 +108,7 @@ def test_the_worst_noise_and_push_reach_most_of_the_bound(row, share):
 
 def test_an_axis_that_is_taken_for_resting_departs_by_no_more_than_its_rate_causes():
     rate, quiet = 0.02, np.zeros((400, 2))
-    away, fast, push, pull = resting_axes(LOOP, rate)
+    away, fast, push, pull = resting_axes(loop(), rate)
     for error in (-0.2, 0.0, 0.2):
         for signs in ((1.0, 1.0, 1.0), (-1.0, 1.0, 1.0), (1.0, -1.0, 1.0), (-1.0, -1.0, 1.0)):
             found = np.abs(run(quiet[:, 0], error, quiet, quiet[:, 0], rate * np.array(signs)))

@@ -168,7 +168,7 @@ def test_a_plan_with_other_gains_has_no_tube():
 
 LIMITS = {
     "rest": (replace(BUDGET, position_noise=0.02), r"may rest .* mm from the goal"),
-    "delay": (replace(BUDGET, delay=0.3), "is not stable"),
+    "delay": (replace(BUDGET, delay=0.08), "is not stable"),
 }
 
 

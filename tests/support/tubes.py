@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 
 from coop_drake.answers import Plan
 from coop_drake.answers.budget import Budget
@@ -32,6 +33,7 @@ WITH_AXES = replace(BUDGET, axes=True, angle_noise=0.0015, rate_noise=0.03)
 """The same with angles and joints."""
 
 
+@cache
 def tubed_problem(budget: Budget = BUDGET, team: str = "base") -> tuple[Scenario, Plan]:
     """Scenario with this control rate, and its plan with a tube for a budget."""
     scenario, plan = small_problem(team, ScheduledGains(command_age=0.0175))

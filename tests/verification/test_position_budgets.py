@@ -1,7 +1,6 @@
 """The position's part of a budget is accepted as the planner states it, and refused if altered."""
 
 from dataclasses import replace
-from functools import cache
 
 import numpy as np
 import pytest
@@ -17,7 +16,6 @@ from tests.support.tubes import BUDGET, tubed_problem
 TOLERANCE = 0.01
 
 
-@cache
 def plan():
     return tubed_problem()[1]
 
@@ -60,25 +58,24 @@ def with_transition(k, **changes):
     return replace(plan(), transitions=tuple(transitions))
 
 
-def altered():
-    """What is altered, by the place that is named."""
-    own, region = plan().transitions[1], plan().transitions[1].governed
-    gains = replace(own.gains, stiffness=own.gains.stiffness + 1.0)
-    return {
-        "transitions[1].governed": [
-            {"governed": region.buffer(1e-4, join_style="mitre")},
-            {"governed": region.buffer(0.1)},
-            {"governed": None},
-        ],
-        "transitions[1].gains.stiffness": [{"gains": gains}],
-        "transitions[1].path": [{"neck": own.neck + 1e-3}, {"path": own.path + 1e-3}],
-        "transitions[1].inradius": [{"inradius": 2.0}],
-    }
+ALTERED = {
+    "transitions[1].governed": lambda own: [
+        {"governed": own.governed.buffer(1e-4, join_style="mitre")},
+        {"governed": own.governed.buffer(0.1)},
+        {"governed": None},
+    ],
+    "transitions[1].gains.stiffness": lambda own: [
+        {"gains": replace(own.gains, stiffness=own.gains.stiffness + 1.0)}
+    ],
+    "transitions[1].path": lambda own: [{"neck": own.neck + 1e-3}, {"path": own.path + 1e-3}],
+    "transitions[1].inradius": lambda own: [{"inradius": 2.0}],
+}
+"""What is altered in the second transition, by the place that is named."""
 
 
-@pytest.mark.parametrize("place", altered())
+@pytest.mark.parametrize("place", ALTERED)
 def test_altered_regions_and_paths_are_refused(place):
-    for changes in altered()[place]:
+    for changes in ALTERED[place](plan().transitions[1]):
         assert refusal(with_transition(1, **changes)) == place
 
 
