@@ -1,5 +1,6 @@
 """Settings of all tests: the same examples on every machine, so that a failure seen once is seen again."""
 
+import gc
 import os
 
 # The matrices are small: threads of BLAS would get into each other's way, and change the order of sums.
@@ -19,3 +20,9 @@ settings.load_profile("reproducible")
 def own_map_cache(tmp_path_factory):
     """Leave the user's cache alone, also in processes that tests start."""
     os.environ["COOP_DRAKE_CACHE"] = str(tmp_path_factory.mktemp("cache"))
+
+
+def pytest_collection_finish():
+    """Keep the garbage collector from what was collected: it lives as long as the session."""
+    gc.collect()
+    gc.freeze()
