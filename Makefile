@@ -27,8 +27,8 @@ demo: $(WARM)  ## plan, simulate and record the paper's transport
 test: $(READY_TO_DEVELOP) $(WARM)  ## run all tests but the slow ones
 	$(BIN)/python -m pytest -n 2 --dist worksteal -m "not slow"
 
-test-slow: $(READY_TO_DEVELOP) $(WARM)  ## run the slow tests
-	$(BIN)/python -m pytest -n 2 --dist worksteal -m slow
+test-slow: $(READY_TO_DEVELOP) $(WARM)  ## run the slow tests; files without any are not read
+	$(BIN)/python -m pytest -n 2 --dist worksteal -m slow $$(grep -rl mark.slow tests --include='test_*.py')
 
 test-all: $(READY_TO_DEVELOP) $(WARM)  ## run every test, and show which lines none of them runs
 	$(BIN)/python -m pytest -n 2 --dist worksteal --cov --cov-report=term-missing

@@ -52,6 +52,12 @@ def run(problem, acts=None, *, restarts=1, faults=NO_FAULTS, **options):
     return log, facts, told
 
 
+@cache
+def together():
+    """The log of the sampled team of base in one process."""
+    return simulate(*sampled("base"), small_maps())
+
+
 def kill(*indices):
     def act(team):
         for index in indices:
@@ -74,7 +80,7 @@ def test_a_run_is_that_of_one_process_with_as_many_messages_of_the_team():
     counted = communication(simulate_apart(*problem, small_maps(), exchange=direct))
     log, facts, _ = run(problem)
     assert log.reached
-    assert differences(log, simulate(*problem, small_maps())) == []
+    assert differences(log, together()) == []
     sent = [process["team_messages"] for process in facts["processes"]]
     assert sent == [*counted.reports, counted.announcements]
     said = [2 if sender is None else 1 for _, sender, _ in direct.messages]
@@ -91,16 +97,16 @@ def test_a_held_team_of_three_with_noise_delay_and_losses_runs_as_in_one_process
         measurements=Measurements(1e-3, 5e-4, 1e-3, delay=0.01),
         messages=Messages(loss=0.2),
     )
-    together = simulate(*problem, small_maps())
-    assert together.reached
-    assert differences(together, run(problem)[0]) == []
+    in_one = simulate(*problem, small_maps())
+    assert in_one.reached
+    assert differences(in_one, run(problem)[0]) == []
 
 
 @pytest.mark.slow
 def test_the_pace_of_the_wall_clock_changes_nothing_where_nobody_is_late():
     problem = sampled("base")
     log, facts, _ = run(problem, pacing=Pacing(allowed=30.0))
-    assert differences(log, simulate(*problem, small_maps())) == []
+    assert differences(log, together()) == []
     ages = facts["command_ages"]
     assert ages["count"] == 2 * (1 + round(log.times[-1] / 0.01))
     assert 0.0 < ages["median"] <= ages["high"] <= ages["largest"] < 30.0
@@ -209,7 +215,7 @@ def test_a_world_that_is_built_by_the_page_of_messages_runs_the_team_as_ours_doe
     assert outside.refused == [6, 7, 7]
     assert capfd.readouterr().err.count("robot 0 refused a message, and goes on: Expected") == 2
     assert log.reached
-    assert differences(log, simulate(*problem, small_maps())) == []
+    assert differences(log, together()) == []
 
 
 class Hostile:
@@ -260,7 +266,7 @@ def test_the_log_beside_one_who_floods_forges_and_sends_random_bytes_is_that_of_
     finally:
         hostile.close()
     assert log.reached
-    assert differences(simulate(*problem, small_maps()), log) == []
+    assert differences(together(), log) == []
 
 
 @pytest.mark.slow
@@ -337,7 +343,7 @@ def test_a_supervisor_that_is_killed_and_started_again_learns_the_cell_and_nothi
     assert facts["restarts"] == {"the supervisor": 1}
     assert facts["stops"] == []
     assert min(log.funnel_margin.min(), log.slice_margin.min(), log.cell_clearance.min()) > 0.0
-    assert set(log.cell_index) == set(simulate(*problem, small_maps()).cell_index)
+    assert set(log.cell_index) == set(together().cell_index)
 
 
 @pytest.mark.slow
