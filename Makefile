@@ -27,8 +27,9 @@ demo: $(WARM)  ## plan, simulate and record the paper's transport
 test: $(READY_TO_DEVELOP) $(WARM)  ## run all tests but the slow ones
 	$(BIN)/python -m pytest -n 2 --dist worksteal -m "not slow"
 
-test-slow: $(READY_TO_DEVELOP) $(WARM)  ## run the slow tests; files without any are not read
-	$(BIN)/python -m pytest -n 2 --dist worksteal -m slow $$(grep -rl mark.slow tests --include='test_*.py')
+# Some of them wait for processes that they ended or stopped; files without slow tests are not read.
+test-slow: $(READY_TO_DEVELOP) $(WARM)  ## run the slow tests
+	$(BIN)/python -m pytest -n 3 --dist worksteal -m slow $$(grep -rl mark.slow tests --include='test_*.py')
 
 test-all: $(READY_TO_DEVELOP) $(WARM)  ## run every test, and show which lines none of them runs
 	$(BIN)/python -m pytest -n 2 --dist worksteal --cov --cov-report=term-missing
@@ -71,9 +72,10 @@ $(WARM): $(READY)
 	-$(BIN)/coop-drake doctor --warm
 	touch $@
 
-# What running takes is installed first, so that `make demo` does not wait for what developing takes.
+# What running takes is installed first, so that `make demo` does not wait for what developing takes. The package
+# itself is there by then, and is not built again.
 $(READY_TO_DEVELOP): $(READY)
-	$(PIP) -e '.[dev,bench]'
+	$(PIP) 'coop-drake[dev,bench]'
 	touch $@
 
 clean:  ## remove the environment and everything generated
