@@ -149,16 +149,17 @@ def integer(flat: FlatMap, array: int, k: int, width: int, column: int) -> int:
 
 @compiled(borrows=True)
 def among_walls(numbers: FloatArray, first: int, count: int, x: float, y: float) -> tuple[bool, float, float]:
-    """Whether a point is inside, and the point of the walls that is nearest to it.
+    """Whether a point is inside, and the nearest point of the walls if not, else the point itself.
 
     It is inside where a ray to the right crosses an odd number of walls. The walls of all
     rings, so many, stand one after the other in an array, from index ``first`` on.
     """
     inside, best, bx, by = False, np.inf, x, y
     for e in range(first, first + 4 * count, 4):
-        x0, y0, x1, y1 = numbers[e], numbers[e + 1], numbers[e + 2], numbers[e + 3]
-        if ray_crosses(x, y, x0, y0, x1, y1):
+        if ray_crosses(x, y, numbers[e], numbers[e + 1], numbers[e + 2], numbers[e + 3]):
             inside = not inside
+    for e in range(first, first if inside else first + 4 * count, 4):
+        x0, y0, x1, y1 = numbers[e], numbers[e + 1], numbers[e + 2], numbers[e + 3]
         t = nearest_fraction(x, y, x0, y0, x1, y1)
         px, py = x0 + t * (x1 - x0), y0 + t * (y1 - y0)
         distance = (px - x) ** 2 + (py - y) ** 2
@@ -488,8 +489,7 @@ def evaluate_one(m: FlatMap, x: float, y: float) -> tuple[float, float, float, f
     wall.
     """
     if integer(m, LEAF_STATE, leaf_at(m, x, y), 1, 0) != INSIDE:
-        inside, wall_x, wall_y = among_walls(m, row(m, EDGES, 0, 4), length_of(m, EDGES, 0), x, y)
-        x, y = (x, y) if inside else (wall_x, wall_y)
+        _, x, y = among_walls(m, row(m, EDGES, 0, 4), length_of(m, EDGES, 0), x, y)
     (tu, tv, xu, yu, xv, yv, step_x, step_y), vertex = _all_sums(m, x, y)
     if step_x != 0.0 or step_y != 0.0:
         (_, _, xu, yu, xv, yv, _, _), _ = _all_sums(m, x + step_x, y + step_y)

@@ -13,8 +13,7 @@ from shapely import Point
 from coop_drake.errors import FieldError
 from coop_drake.geometry.polygons import edges_of, extent_of
 from coop_drake.harmonic_maps.evaluate import FlatMap, among_walls, evaluate_one
-from coop_drake.harmonic_maps.harmonic_map import HarmonicMap
-from coop_drake.harmonic_maps.outline import as_points
+from coop_drake.harmonic_maps.harmonic_map import HarmonicMap, as_points
 from coop_drake.jit import compiled
 from coop_drake.tree.pose import FloatArray
 

@@ -11,6 +11,7 @@ from contextlib import suppress
 from dataclasses import asdict, dataclass
 from functools import cache
 from importlib.metadata import version
+from math import isfinite
 from pathlib import Path
 from threading import Lock
 from typing import Any, NamedTuple
@@ -20,12 +21,12 @@ import shapely
 from numpy.typing import ArrayLike
 from shapely import Point, Polygon
 
-from coop_drake.errors import UnmappableError
+from coop_drake.errors import FieldError, UnmappableError
 from coop_drake.files import write_atomically
 from coop_drake.harmonic_maps import TOLERANCE
 from coop_drake.harmonic_maps.assemble import pack_layers
 from coop_drake.harmonic_maps.evaluate import FlatMap, MapArrays, evaluate_many, flatten, unflatten
-from coop_drake.harmonic_maps.outline import Outline, as_points, outline_of, region_to_map
+from coop_drake.harmonic_maps.outline import Outline, outline_of, region_to_map
 from coop_drake.harmonic_maps.panels import Panels, lay_panels, leg_panels
 from coop_drake.harmonic_maps.solve import Density, solve_density
 from coop_drake.jit import compiler_settings
@@ -114,6 +115,26 @@ class Solution(NamedTuple):
     def centre(self) -> FloatArray:
         """Origin of the map's coordinates in W [m], shape (2,)."""
         return self.flat[:2]
+
+
+def as_points(points: ArrayLike) -> FloatArray:
+    """Points as an array of floats, shape (..., 2) [m].
+
+    Raises:
+        FieldError: If the last axis is not x, y, or a coordinate is not a finite number.
+    """
+    try:
+        p = np.asarray(points, dtype=float)
+    except (TypeError, ValueError) as error:
+        raise FieldError(f"points must be numbers of shape (..., 2), got {type(points).__name__}") from error
+    if p.ndim == 0 or p.shape[-1] != 2:
+        raise FieldError(f"points must have shape (..., 2), got {p.shape}")
+    # The sum is quicker than a flag for each: it is finite unless a coordinate is not, or it overflows.
+    total = sum(p.tolist()) if p.ndim == 1 else p.sum()
+    if not isfinite(total) and not np.isfinite(p).all():
+        first = np.argwhere(~np.isfinite(p).all(axis=-1))[0].tolist()
+        raise FieldError(f"points must be finite, but point {first or 0} is {p[tuple(first)].tolist()}")
+    return p
 
 
 class HarmonicMap:

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import isfinite
 
 import numpy as np
 import shapely
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 from shapely import Point, Polygon
 from shapely.geometry.base import BaseGeometry
 
@@ -30,26 +29,6 @@ _TINY = 1e-7
 """Edges shorter than this fraction of the diameter are left out: rounding decides their angles [-]."""
 _SHARPEST_AT_GOAL = np.deg2rad(5.0)
 """A goal that meets a wall at a smaller angle does not collapse: too many nodes [rad]."""
-
-
-def as_points(points: ArrayLike) -> FloatArray:
-    """Points as an array of floats, shape (..., 2) [m].
-
-    Raises:
-        FieldError: If the last axis is not x, y, or a coordinate is not a finite number.
-    """
-    try:
-        p = np.asarray(points, dtype=float)
-    except (TypeError, ValueError) as error:
-        raise FieldError(f"points must be numbers of shape (..., 2), got {type(points).__name__}") from error
-    if p.ndim == 0 or p.shape[-1] != 2:
-        raise FieldError(f"points must have shape (..., 2), got {p.shape}")
-    # The sum is quicker than a flag for each: it is finite unless a coordinate is not, or it overflows.
-    total = sum(p.tolist()) if p.ndim == 1 else p.sum()
-    if not isfinite(total) and not np.isfinite(p).all():
-        first = np.argwhere(~np.isfinite(p).all(axis=-1))[0].tolist()
-        raise FieldError(f"points must be finite, but point {first or 0} is {p[tuple(first)].tolist()}")
-    return p
 
 
 def region_to_map(domain: Polygon, goal: Point | Polygon) -> tuple[Polygon, Point | Polygon]:

@@ -8,6 +8,8 @@ from coop_drake.systems.block import (
     REQUEST_SIZE,
     Block,
     build_selector,
+    robot_record,
+    supervisor_record,
 )
 from coop_drake.systems.departures import FloorFriction, Pushes, Sticking, WheelSlips
 from coop_drake.systems.governor import GovernedCell, NominalGovernor, NominalMotion, ReferenceGovernor
@@ -22,14 +24,7 @@ from coop_drake.systems.measurements import (
     TeamSensor,
     build_separate_sensor,
 )
-from coop_drake.systems.messages import (
-    Exchange,
-    Interruption,
-    MessageChannel,
-    TeamLink,
-    robot_record,
-    supervisor_record,
-)
+from coop_drake.systems.messages import Exchange, Interruption, MessageChannel, TeamLink
 from coop_drake.systems.monitors import ArrivalMonitor, DepartureMonitor, MonitoredRobot
 from coop_drake.systems.ppc import AxisLaw, AxisMotion, AxisPpc, NominalAxes, axis_laws
 from coop_drake.systems.readiness import CellPlanner, ReadyMonitor

@@ -29,6 +29,26 @@ ALARM_SIZE = 3
 """Size of what a monitor says: 0 while it is quiet, 1 where it asks for a hold, 2 where the drives shall
 brake; the largest departure over its level; and the number of this level [-]."""
 
+
+def robot_record(joints: int, *, holds: bool, monitored: bool = False) -> dict[str, int]:
+    """Return the names and sizes of the outputs of a robot with n joints that are logged."""
+    return {
+        "governor_position": 2,
+        "energy_margin": 1,
+        "funnels": 2 * (1 + joints),
+        "object_acceleration": 3,
+        "hand_command": 6,
+        "ready": READY_SIZE,
+        "clock": CLOCK_SIZE if holds else 0,
+        "alarm": ALARM_SIZE if monitored else 0,
+    }
+
+
+def supervisor_record(robots: int, *, holds: bool) -> dict[str, int]:
+    """Return the names and sizes of the outputs of the supervisor of N robots that are logged."""
+    return {"current_cell": CURRENT_CELL_SIZE, "arrived": 1, "causes": 1 + robots if holds else 0}
+
+
 _ON_TIME = np.array([0.0, 1.0, 0.0])
 
 

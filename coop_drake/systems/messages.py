@@ -17,7 +17,7 @@ from coop_drake.laws.measurements import (
     uniform_pair,
     whole_periods,
 )
-from coop_drake.systems.block import ALARM_SIZE, CLOCK_SIZE, CURRENT_CELL_SIZE, READY_SIZE, Block
+from coop_drake.systems.block import READY_SIZE, Block
 from coop_drake.tree.pose import FloatArray
 
 
@@ -137,25 +137,6 @@ class Interruption(Block):
             output.SetFromVector(self.kept(context))
         else:
             output.SetFromVector(np.zeros(output.size()))
-
-
-def robot_record(joints: int, *, holds: bool, monitored: bool = False) -> dict[str, int]:
-    """Return the names and sizes of the outputs of a robot with n joints that are logged."""
-    return {
-        "governor_position": 2,
-        "energy_margin": 1,
-        "funnels": 2 * (1 + joints),
-        "object_acceleration": 3,
-        "hand_command": 6,
-        "ready": READY_SIZE,
-        "clock": CLOCK_SIZE if holds else 0,
-        "alarm": ALARM_SIZE if monitored else 0,
-    }
-
-
-def supervisor_record(robots: int, *, holds: bool) -> dict[str, int]:
-    """Return the names and sizes of the outputs of the supervisor of N robots that are logged."""
-    return {"current_cell": CURRENT_CELL_SIZE, "arrived": 1, "causes": 1 + robots if holds else 0}
 
 
 class Exchange(Protocol):

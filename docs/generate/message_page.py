@@ -28,7 +28,7 @@ from coop_drake.apart.messages import (
 )
 from coop_drake.apart.robot import LONGEST_DOUBT
 from coop_drake.laws.actuators import BASE_RATE, JOINT_DAMPING, RETURN_RATE, TURN_RATE
-from coop_drake.systems.messages import robot_record
+from coop_drake.systems.block import robot_record
 
 _SECTIONS = (
     (

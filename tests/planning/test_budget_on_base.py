@@ -13,11 +13,17 @@ from coop_drake.answers.budget import Budget
 from coop_drake.cli import app
 from coop_drake.cli.task import read_task
 from coop_drake.diagram.robot_controller import axis_levels
+from coop_drake.laws import ScheduledGains
+from coop_drake.planning.budget.fitting import fit_budget
 from coop_drake.planning.planner import plan
+from coop_drake.plant import planning_problem
 from coop_drake.plant.facts import budget_of, scenario_budgets
 from coop_drake.robustness.alarms import unseen_of
 from coop_drake.shipped import scenario_file
 from coop_drake.verification import verify_plan
+from coop_drake.verification.gains import check_ages
+from tests.support.small_loop import small_problem
+from tests.support.tubes import WITH_AXES
 
 MOBILE_BASE = Budget(
     control_rate=200.0, delay=0.01, lag=0.005, angle_noise=0.0015, rate_noise=0.03, model_error=0.2,
@@ -107,6 +113,28 @@ def test_departures_two_and_a_half_times_as_large_lose_an_axis(base):
     larger = replace(larger, delay=MOBILE_BASE.delay, lag=MOBILE_BASE.lag, report_age=MOBILE_BASE.report_age)
     runs = [run_axes(base, larger, worst_departures(base, larger, seed)) for seed in range(2)]
     assert min(run.nearest for run in runs) < 0.0
+
+
+def test_gains_for_a_share_of_the_limits_of_rates_state_none_where_no_rate_is_limited(monkeypatch):
+    """The only limit is the speed of a base at the object's origin, to which no axis adds."""
+    monkeypatch.setattr(
+        "coop_drake.planning.budget.fitting.CHOICES", (tuple((older, 0.5) for older in (1.0, 2.0, 3.0)),)
+    )
+    gains = ScheduledGains(command_age=0.0175)
+    scenario, made = small_problem("base", gains)
+    problem, none = planning_problem(scenario), np.array([np.inf])
+    limits = replace(
+        problem.limits,
+        base_components=(0,),
+        base_points=((0.0, 0.0),),
+        base_speeds=np.array([0.3]),
+        turn_rates=none,
+        joint_rates=np.repeat(none, len(made.joint_names)),
+    )
+    fitted = fit_budget(replace(problem, limits=limits), made, gains, WITH_AXES)
+    assert not np.isfinite([one.gains.rate_limit for one in fitted.transitions]).any()
+    assert max(one.gains.speed_limit for one in fitted.transitions) < 0.3
+    check_ages(fitted, gains)
 
 
 @pytest.mark.slow

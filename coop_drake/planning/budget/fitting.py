@@ -269,8 +269,10 @@ def _stated(
     rest = RestCondition(
         float(table[0, LEAVING_TIME]), table[:, REST_REACH].copy(), table[:, REST_RATE].copy()
     )
-    gains = replace(transition.gains, rest=rest)
-    return replace(transition, gains=gains, tolerance=_tolerance(factor * choice[0], choice[1], passed, loop))
+    gains, (older, share) = replace(transition.gains, rest=rest), choice
+    if gains.rate_limit is None or not np.isfinite(gains.rate_limit).any():
+        share = 1.0  # a share of no limit is none
+    return replace(transition, gains=gains, tolerance=_tolerance(factor * older, share, passed, loop))
 
 
 def _tolerance(age_factor: float, rate_share: float, passed: ProvedTransition, loop: AxisLoop) -> Tolerance:
