@@ -21,7 +21,7 @@ from coop_drake.diagram import brakes_of, build_station, control_period
 from coop_drake.harmonic_maps import HarmonicMap
 from coop_drake.laws.actuators import braking_effort
 from coop_drake.scenario import Control, Floor, Hold, Scenario
-from coop_drake.tree.pose import FloatArray
+from coop_drake.tree.arrays import FloatArray
 
 WAYS = ("brake", "hold", "follow", "brake_with_friction")
 """What the others do: their drives brake, as in a team of processes; they hold; they follow the plan."""

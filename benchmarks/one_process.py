@@ -20,7 +20,7 @@ from coop_drake.harmonic_maps import HarmonicMap
 from coop_drake.laws.actuators import Brake, braking_effort
 from coop_drake.scenario import Scenario
 from coop_drake.simulation import Sample, run_loop
-from coop_drake.tree.pose import FloatArray
+from coop_drake.tree.arrays import FloatArray
 
 
 class DirectExchange:

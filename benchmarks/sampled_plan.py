@@ -24,7 +24,7 @@ from coop_drake.laws.nominal import lag_factors
 from coop_drake.laws.ppc import fading
 from coop_drake.laws.readiness import axis_ready
 from coop_drake.robustness.alarms import unseen_of
-from coop_drake.tree.pose import FloatArray
+from coop_drake.tree.arrays import FloatArray
 
 HELD, SLOWEST = 0.5, 6.0
 """A plan's axes are followed for so long in the last cell, and for so long in any other one at most [s]."""

@@ -10,7 +10,7 @@ from coop_drake.jit import compiled
 from coop_drake.laws.governor import governed_acceleration
 from coop_drake.laws.nominal import nominal_flow
 from coop_drake.robustness.position import PositionGains
-from coop_drake.tree.pose import FloatArray
+from coop_drake.tree.arrays import FloatArray
 
 
 @compiled

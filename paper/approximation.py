@@ -12,8 +12,8 @@ from shapely import MultiPoint, Polygon, union_all
 from shapely.geometry.base import BaseGeometry
 
 from coop_drake.geometry.swept_tree import Intervals, SweptTree
+from coop_drake.tree.arrays import FloatArray
 from coop_drake.tree.component_tree import ComponentTree
-from coop_drake.tree.pose import FloatArray
 
 __all__ = ["Approximation", "approximations", "two_components"]
 

@@ -15,8 +15,8 @@ from shapely.geometry.base import BaseGeometry
 from coop_drake.drawing.canvas import draw_polygon, draw_team, new_figure, team_legend
 from coop_drake.drawing.colours import BLUE, GREEN, GREY, INK
 from coop_drake.geometry.swept_tree import Interval
+from coop_drake.tree.arrays import FloatArray
 from coop_drake.tree.component_tree import ComponentTree
-from coop_drake.tree.pose import FloatArray
 from paper.approximation import Approximation
 
 __all__ = ["approximation_figure"]

@@ -12,7 +12,7 @@ from coop_drake.drawing.canvas import house_style, new_figure, save_figure
 from coop_drake.drawing.colours import BLUE, GREY, VERMILLION
 from coop_drake.laws import energy_margin, total_wrench, tracking_energy, wrench_share
 from coop_drake.laws.readiness import EROSION, clearance_margin
-from coop_drake.tree.pose import FloatArray
+from coop_drake.tree.arrays import FloatArray
 from paper import printed
 from paper.funnel_errata_panels import (
     draw_funnel_bounds,

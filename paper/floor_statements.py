@@ -8,7 +8,7 @@ import numpy as np
 from shapely import distance, points
 
 from coop_drake.answers import PlanningProblem
-from coop_drake.tree.pose import FloatArray
+from coop_drake.tree.arrays import FloatArray
 from paper.approximation import Approximation
 from paper.exhibits import Statement
 from paper.runs import Run

@@ -8,7 +8,7 @@ from scipy.integrate import solve_ivp
 
 from coop_drake.drawing.colours import BLUE, GREY, VERMILLION
 from coop_drake.laws import Funnel, funnel_bounds
-from coop_drake.tree.pose import FloatArray
+from coop_drake.tree.arrays import FloatArray
 from paper import printed
 from paper.table_1 import CORRECTED, START
 

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from coop_drake.laws import energy_margin, governed_acceleration, governor_velocity, tracking_energy
-from coop_drake.tree.pose import FloatArray
+from coop_drake.tree.arrays import FloatArray
 
 __all__ = ["Clearance", "GovernorRun", "Margin", "box_clearance", "run_governor", "straight_field"]
 

@@ -10,7 +10,7 @@ from matplotlib.lines import Line2D
 from coop_drake.answers import Plan
 from coop_drake.drawing.canvas import new_figure
 from coop_drake.drawing.colours import GREY, INK, OBJECT, robot_colour
-from coop_drake.tree.pose import FloatArray
+from coop_drake.tree.arrays import FloatArray
 from paper.table_1 import CORRECTED, PRINTED
 
 __all__ = ["interval_figure"]

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from coop_drake.tree.pose import FloatArray
+from coop_drake.tree.arrays import FloatArray
 
 __all__ = ["angle_bounds", "axis_law", "energy_margin", "projector", "rate_term", "wrench_share"]
 

@@ -10,7 +10,7 @@ import numpy as np
 from coop_drake.answers import Plan
 from coop_drake.laws import FixedGains
 from coop_drake.plant.team import ObjectInertia
-from coop_drake.tree.pose import FloatArray
+from coop_drake.tree.arrays import FloatArray
 from paper.comparison import GainFigures
 from paper.exhibits import Statement
 from paper.stated import CELLS, START, TABLE_2, Parameter

@@ -9,7 +9,7 @@ import numpy as np
 from coop_drake.answers import PlanningProblem
 from coop_drake.laws.readiness import RATE_TOLERANCE, SPEED_TOLERANCE
 from coop_drake.simulation import WRENCH_TOLERANCE
-from coop_drake.tree.pose import FloatArray
+from coop_drake.tree.arrays import FloatArray
 from paper.exhibits import Statement
 from paper.runs import Run
 from paper.stated import CELLS, GOAL

@@ -12,7 +12,7 @@ from coop_drake.cli import app, new
 from coop_drake.cli.task import read_task
 from coop_drake.planning.planner import plan
 from coop_drake.scenario import load_scenario
-from coop_drake.tree.pose import PlanarPose
+from coop_drake.tree.component_tree import PlanarPose
 from tests.support.floor_plan_files import write_svg
 
 

@@ -13,8 +13,8 @@ from shapely.geometry.base import BaseGeometry
 
 from benchmarks.adversaries.collisions import Team
 from coop_drake.answers import PlanningProblem
-from coop_drake.tree.component_tree import Body, Component, ComponentTree, ConvexShape, TreeJoint
-from coop_drake.tree.pose import FloatArray, PlanarPose
+from coop_drake.tree.arrays import FloatArray
+from coop_drake.tree.component_tree import Body, Component, ComponentTree, ConvexShape, PlanarPose, TreeJoint
 from coop_drake.verification.question import question_of
 
 Random = np.random.Generator

@@ -10,8 +10,8 @@ from shapely import Polygon, affinity, box, normalize, union_all
 from shapely.geometry.base import BaseGeometry
 
 from coop_drake.answers import PlanningProblem
-from coop_drake.tree.component_tree import Body, Component, ComponentTree, ConvexShape, TreeJoint
-from coop_drake.tree.pose import FloatArray, PlanarPose
+from coop_drake.tree.arrays import FloatArray
+from coop_drake.tree.component_tree import Body, Component, ComponentTree, ConvexShape, PlanarPose, TreeJoint
 
 _JOINT_LIMIT = 1.87
 """Joints move between minus and plus this angle, as in the paper [rad]."""

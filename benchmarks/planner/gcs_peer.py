@@ -39,8 +39,8 @@ from shapely.geometry.base import BaseGeometry
 from benchmarks.questions.peers import run_trees
 from coop_drake.answers import PlanningProblem
 from coop_drake.tree import PlanarPose
+from coop_drake.tree.arrays import FloatArray
 from coop_drake.tree.component_tree import ConvexShape, TreeJoint, configuration_scale
-from coop_drake.tree.pose import FloatArray
 
 _SEEDS = range(1, 12)
 """Seeds of the trees, of which the first path is taken."""

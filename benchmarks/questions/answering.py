@@ -37,7 +37,7 @@ from coop_drake.errors import PatienceError, RefusalError
 from coop_drake.files import write_atomically
 from coop_drake.planning import warm_up
 from coop_drake.planning.planner import plan
-from coop_drake.tree.pose import FloatArray
+from coop_drake.tree.arrays import FloatArray
 from coop_drake.typed_data import to_plain
 from coop_drake.verification import verify_plan, verify_proof
 from coop_drake.verification.runs.bodies import least_distances

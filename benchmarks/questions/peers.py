@@ -18,8 +18,8 @@ import shapely
 from benchmarks.questions.tree_kernels import rrt_connect
 from coop_drake.answers import PlanningProblem
 from coop_drake.planning.sampling.collision import grid_for_team, is_free
+from coop_drake.tree.arrays import FloatArray
 from coop_drake.tree.component_tree import ConvexShape, configuration_scale, team_arrays
-from coop_drake.tree.pose import FloatArray
 
 if TYPE_CHECKING:
     from ompl import base as ob

@@ -22,8 +22,8 @@ from coop_drake.planning.sampling.collision import ALL, bodies_apart, grid_for_t
 from coop_drake.plant import planning_problem
 from coop_drake.scenario import Goal, ObjectPose, Scenario, Start, Workspace, dump_scenario, load_scenario
 from coop_drake.scenario.model import DirectiveEntry, RobotLimits
+from coop_drake.tree.arrays import FloatArray
 from coop_drake.tree.component_tree import ComponentTree, TeamArrays, axis_levers, place_into
-from coop_drake.tree.pose import FloatArray
 
 _DRAWN, _REFINED = 4_000, 8_000
 """Configurations drawn anywhere, and drawn near the best one so far [-]: together some 20 ms."""

@@ -8,8 +8,8 @@ import numpy as np
 
 from coop_drake.jit import compiled
 from coop_drake.planning.sampling.collision import ObstacleGrid, is_free_placed
+from coop_drake.tree.arrays import FloatArray, IntArray
 from coop_drake.tree.component_tree import TeamArrays
-from coop_drake.tree.pose import FloatArray, IntArray
 
 _TRAPPED, _ADVANCED, _REACHED = 0, 1, 2
 

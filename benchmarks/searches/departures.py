@@ -13,7 +13,7 @@ from coop_drake.answers.budget import Budget
 from coop_drake.scenario.budget_file import wave_bounds
 from coop_drake.scenario.deployment import Wave, Waves
 from coop_drake.tree import ComponentTree
-from coop_drake.tree.pose import FloatArray
+from coop_drake.tree.arrays import FloatArray
 
 _SHORTEST, _LONGEST = 2.0, 4.0
 """Shortest period of a wave in control periods [-], so that its sign changes with every sample, and longest

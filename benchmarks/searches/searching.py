@@ -27,7 +27,7 @@ from coop_drake.errors import ScenarioError
 from coop_drake.files import write_atomically
 from coop_drake.plant import planning_problem
 from coop_drake.tree import ComponentTree
-from coop_drake.tree.pose import FloatArray
+from coop_drake.tree.arrays import FloatArray
 from coop_drake.tuning.search import evolution_strategy
 from coop_drake.typed_data import LARGEST, DataError, Limits, Positive
 

@@ -19,8 +19,8 @@ from coop_drake.answers.problem import PlanningProblem, TeamLimits
 from coop_drake.errors import PlanError, ScenarioError, shortened
 from coop_drake.files import check_readable, write_atomically
 from coop_drake.geometry.polygons import corners_of
+from coop_drake.tree.arrays import FloatArray
 from coop_drake.tree.component_tree import Component, ComponentTree, ConvexShape, TreeJoint
-from coop_drake.tree.pose import FloatArray
 from coop_drake.typed_data import Codec, DataError, Number, convert, convert_class, to_plain
 
 # Regions in files: the rings of a polygon, without their closing corners.

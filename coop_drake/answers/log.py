@@ -12,7 +12,7 @@ import numpy as np
 
 from coop_drake.errors import PlanError
 from coop_drake.files import check_readable, write_atomically
-from coop_drake.tree.pose import FloatArray, IntArray
+from coop_drake.tree.arrays import FloatArray, IntArray
 
 _DAMAGE = (
     OSError,

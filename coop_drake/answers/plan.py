@@ -26,7 +26,7 @@ from coop_drake.answers.problem import PlanningProblem
 from coop_drake.answers.proof import InfeasibilityProof
 from coop_drake.errors import PlanError
 from coop_drake.laws.gains import GainSet, ScheduledGains, TransitionGains
-from coop_drake.tree.pose import FloatArray
+from coop_drake.tree.arrays import FloatArray
 from coop_drake.typed_data import EXACT, Bounds, Limits, NotNegative, Number, Positive, Vector, to_plain
 
 if TYPE_CHECKING:

@@ -6,8 +6,8 @@ from typing import Annotated, Literal
 import numpy as np
 from shapely import Polygon
 
+from coop_drake.tree.arrays import FloatArray
 from coop_drake.tree.component_tree import Component, ComponentTree
-from coop_drake.tree.pose import FloatArray
 from coop_drake.typed_data import Bounds, Limits, NotNegative, Positive
 
 

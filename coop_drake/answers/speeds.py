@@ -9,7 +9,7 @@ import numpy as np
 
 from coop_drake.answers.log import SimulationLog
 from coop_drake.answers.problem import PlanningProblem
-from coop_drake.tree.pose import FloatArray
+from coop_drake.tree.arrays import FloatArray
 
 SHORTEST = 0.005
 """Speeds of bases are means over at least this time [s]: between rows that are nearer to each other, rounding

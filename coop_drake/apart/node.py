@@ -17,7 +17,7 @@ from coop_drake.errors import MessagingError
 from coop_drake.laws.measurements import whole_periods
 from coop_drake.laws.readiness import MEAN_TIME, RATE_TOLERANCE
 from coop_drake.systems.block import release_all
-from coop_drake.tree.pose import FloatArray
+from coop_drake.tree.arrays import FloatArray
 
 FOLLOWS, HOLDS, STANDS, ASKS, OUTSIDE, RETURNS, LATE = range(7)
 """States of a robot, see ``messages.Effort``."""

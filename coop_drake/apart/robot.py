@@ -29,8 +29,8 @@ from coop_drake.plant import robot_chain
 from coop_drake.plant.chain import is_circle
 from coop_drake.scenario import Deployment
 from coop_drake.systems import axis_laws, robot_record
+from coop_drake.tree.arrays import FloatArray
 from coop_drake.tree.component_tree import whole_turns
-from coop_drake.tree.pose import FloatArray
 
 Said = list[msg.Ready | msg.HoldRequest | msg.AtRest]
 """What a robot tells the supervisor."""

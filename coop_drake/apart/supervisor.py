@@ -15,8 +15,8 @@ from coop_drake.diagram.closed_loop import add_supervisor
 from coop_drake.laws.measurements import period_of, whole_periods
 from coop_drake.scenario import Hold as HoldSettings
 from coop_drake.systems import CellPlanner
+from coop_drake.tree.arrays import FloatArray
 from coop_drake.tree.component_tree import whole_turns
-from coop_drake.tree.pose import FloatArray
 
 _NOTHING = np.array([-1.0, -1.0])
 """What is heard of a robot before its first message, as in a clear channel."""

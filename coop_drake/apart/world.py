@@ -15,7 +15,7 @@ from coop_drake.apart.node import ASKS, FOLLOWS, MOVES, RETURNS, STATES, TURN, S
 from coop_drake.apart.transport import Ends, Network
 from coop_drake.errors import MessagingError
 from coop_drake.laws.actuators import Brake, braking_effort
-from coop_drake.tree.pose import FloatArray
+from coop_drake.tree.arrays import FloatArray
 
 PATIENCE = 5.0
 """How long a process may take for an answer in lock-step before the run goes on without it [s]."""

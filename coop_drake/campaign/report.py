@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from coop_drake.drawing import colours
 from coop_drake.files import plain_numbers, write_atomically
 from coop_drake.templates import rendered
-from coop_drake.tree.pose import FloatArray, IntArray
+from coop_drake.tree.arrays import FloatArray, IntArray
 
 # The measured columns of a table of runs, how they are called and shown, and which rows belong together.
 

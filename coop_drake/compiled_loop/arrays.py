@@ -15,8 +15,8 @@ from coop_drake.laws.departures import WorldDepartures
 from coop_drake.laws.robot_dynamics import MOTION_COLUMNS
 from coop_drake.laws.team_dynamics import StickingRoom, TeamWork, sticking_room, team_work
 from coop_drake.systems.kernels import NOMINAL_SIZE
+from coop_drake.tree.arrays import FloatArray, IntArray
 from coop_drake.tree.component_tree import TeamArrays
-from coop_drake.tree.pose import FloatArray, IntArray
 
 
 class LoopCells(NamedTuple):

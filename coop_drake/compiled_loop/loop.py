@@ -23,7 +23,7 @@ from coop_drake.laws.nominal import carry_axes
 from coop_drake.laws.robot_dynamics import read_robot
 from coop_drake.laws.team_dynamics import stick
 from coop_drake.systems.kernels import step_nominal
-from coop_drake.tree.pose import FloatArray
+from coop_drake.tree.arrays import FloatArray
 
 EARLY = 1e-6
 """Share of a period by which an interval that begins at a sample may seem to begin later [-], by rounding."""

@@ -34,8 +34,8 @@ from coop_drake.simulation.clearance import TeamClearance
 from coop_drake.simulation.run import patience
 from coop_drake.systems import axis_laws
 from coop_drake.systems.kernels import NOTHING
+from coop_drake.tree.arrays import FloatArray, IntArray
 from coop_drake.tree.component_tree import ComponentTree, axis_levers
-from coop_drake.tree.pose import FloatArray, IntArray
 
 
 @dataclass(frozen=True)

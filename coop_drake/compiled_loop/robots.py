@@ -40,7 +40,7 @@ from coop_drake.systems.kernels import (
     robot_arrived,
     show_nominal,
 )
-from coop_drake.tree.pose import FloatArray
+from coop_drake.tree.arrays import FloatArray
 
 LOST_POSE, POSE_NOISE = 1, 5
 """Uses of seeds: losses and noise of measured poses; those of measured states are the next ones."""

@@ -31,7 +31,7 @@ from coop_drake.scenario import Deployment
 from coop_drake.systems.block import READY_SIZE
 from coop_drake.systems.departures import world_departures
 from coop_drake.systems.monitors import LONG_AGO
-from coop_drake.tree.pose import FloatArray
+from coop_drake.tree.arrays import FloatArray
 
 _USES = 8
 """Number of uses of seeds, see ``seed_of``."""

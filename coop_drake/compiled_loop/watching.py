@@ -25,7 +25,7 @@ from coop_drake.geometry.polygons import signed_distance
 from coop_drake.jit import compiled
 from coop_drake.laws.axis_table import bounds_of
 from coop_drake.simulation.clearance import pair_apart, piece_to_walls, place_pieces
-from coop_drake.tree.pose import FloatArray
+from coop_drake.tree.arrays import FloatArray
 
 ROUNDING = 1e-9
 """More than what rounding errors change of a distance and of the way of a run [m]."""

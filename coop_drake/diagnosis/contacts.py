@@ -17,8 +17,8 @@ from coop_drake.drawing import BodyFootprint, team_footprints
 from coop_drake.geometry.polygons import edges_of
 from coop_drake.geometry.swept_tree import Interval
 from coop_drake.planning.questions import exact_footprint
+from coop_drake.tree.arrays import FloatArray
 from coop_drake.tree.component_tree import ComponentTree
-from coop_drake.tree.pose import FloatArray
 
 # Collisions at one configuration: bodies that leave the floor, bodies that overlap.
 

@@ -42,8 +42,8 @@ from coop_drake.planning.sampling.narrow_passages import (
     with_larger_least_clearance,
 )
 from coop_drake.progress import Progress
+from coop_drake.tree.arrays import FloatArray
 from coop_drake.tree.component_tree import Body, ComponentTree, ConvexShape, TreeJoint
-from coop_drake.tree.pose import FloatArray
 
 # Changes of the team or of the goal that would help.
 

@@ -21,7 +21,7 @@ from coop_drake.diagnosis.variants import Answer, BlockingPassage, Bracket, Open
 from coop_drake.drawing import draw_polygon, draw_workspace, new_figure, team_footprints
 from coop_drake.drawing.colours import AT_FAULT, BLUE, GREY, INK, NOT_AT_FAULT, OUTSIDE, PAPER, WALL
 from coop_drake.geometry.polygons import parts_of
-from coop_drake.tree.pose import FloatArray
+from coop_drake.tree.arrays import FloatArray
 
 # A diagnosis in rows and sentences.
 

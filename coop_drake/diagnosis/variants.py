@@ -26,8 +26,8 @@ from coop_drake.planning.sampled_search import SampledSearch
 from coop_drake.planning.sampling.collision import densified
 from coop_drake.planning.transitions import path_through
 from coop_drake.progress import Progress
+from coop_drake.tree.arrays import FloatArray
 from coop_drake.tree.component_tree import configuration_scale
-from coop_drake.tree.pose import FloatArray
 
 # Variants of a question, their answers, and the bracket of the least change that gives another answer.
 

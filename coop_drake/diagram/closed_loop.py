@@ -40,7 +40,7 @@ from coop_drake.systems import (
 )
 from coop_drake.systems.block import release_all
 from coop_drake.systems.departures import add_departures, tilt_floor
-from coop_drake.tree.pose import FloatArray, IntArray
+from coop_drake.tree.arrays import FloatArray, IntArray
 
 # The transport station: the simulated team with sensors, actuators and disturbances.
 

@@ -15,7 +15,7 @@ from coop_drake import systems
 from coop_drake.diagram.robot_controller import TELEMETRY
 from coop_drake.laws.measurements import NOTHING, uniform_pair, whole_periods
 from coop_drake.scenario import Deafness, Deployment, Messages, PoseBias, RobotDepartures, Silence
-from coop_drake.tree.pose import FloatArray
+from coop_drake.tree.arrays import FloatArray
 
 
 def build_radio(deployment: Deployment, robot: int, use: int = 0) -> systems.MessageChannel:

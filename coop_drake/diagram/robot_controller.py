@@ -22,7 +22,8 @@ from coop_drake.plant import ObjectInertia, RobotPlant, TeamPlant, base_chain, b
 from coop_drake.plant.team import RobotModel
 from coop_drake.scenario import Hold, Scenario
 from coop_drake.systems import AxisMotion, GovernedCell, MonitoredRobot, NominalMotion
-from coop_drake.tree.pose import FloatArray, PlanarPose
+from coop_drake.tree.arrays import FloatArray
+from coop_drake.tree.component_tree import PlanarPose
 
 TELEMETRY = (
     "object_state",

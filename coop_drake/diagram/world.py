@@ -18,7 +18,7 @@ from coop_drake.plant import TeamPlant
 from coop_drake.plant.team import base_inertia, displacement
 from coop_drake.scenario import Scenario
 from coop_drake.systems import Exchange, TeamLink, robot_record, supervisor_record
-from coop_drake.tree.pose import IntArray
+from coop_drake.tree.arrays import IntArray
 
 
 @dataclass(frozen=True)

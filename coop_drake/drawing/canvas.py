@@ -24,8 +24,8 @@ from shapely.geometry.polygon import orient
 from coop_drake.drawing.colours import FLOOR, GREY, INK, OBJECT, WALL, robot_colour
 from coop_drake.drawing.solids import team_footprints
 from coop_drake.files import write_atomically
+from coop_drake.tree.arrays import FloatArray
 from coop_drake.tree.component_tree import ComponentTree
-from coop_drake.tree.pose import FloatArray
 
 # Blank figures, captions and legends, drawn without pyplot's global state.
 

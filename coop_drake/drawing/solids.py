@@ -17,8 +17,8 @@ from shapely.geometry.base import BaseGeometry
 from coop_drake.drawing import colours
 from coop_drake.geometry.polygons import parts_of
 from coop_drake.templates import rendered
+from coop_drake.tree.arrays import FloatArray
 from coop_drake.tree.component_tree import ComponentTree
-from coop_drake.tree.pose import FloatArray
 
 # Where to stand to see the whole floor.
 

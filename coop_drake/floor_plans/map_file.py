@@ -19,7 +19,7 @@ from coop_drake.errors import FloorPlanError
 from coop_drake.files import check_readable
 from coop_drake.floor_plans.rooms import Inside, Room
 from coop_drake.floor_plans.settings import FloorPlanSettings
-from coop_drake.tree.pose import FloatArray
+from coop_drake.tree.arrays import FloatArray
 
 # Reads ROS occupancy maps: a picture of cells, and a YAML file that says what its shades mean.
 

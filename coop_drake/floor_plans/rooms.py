@@ -13,7 +13,7 @@ from shapely.validation import explain_validity
 
 from coop_drake.errors import FloorPlanError
 from coop_drake.floor_plans.walls import Drawing, Wall
-from coop_drake.tree.pose import FloatArray
+from coop_drake.tree.arrays import FloatArray
 
 # Joins loose ends of lines to lines that they nearly touch: this adds walls and removes none.
 

@@ -10,7 +10,7 @@ from shapely import Polygon
 
 from coop_drake.errors import FloorPlanError
 from coop_drake.geometry.polygons import corners_of
-from coop_drake.tree.pose import FloatArray
+from coop_drake.tree.arrays import FloatArray
 from coop_drake.typed_data import DataError, Limits, check_fields
 
 # Settings for reading a drawing or a map.

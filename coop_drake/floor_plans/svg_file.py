@@ -34,7 +34,7 @@ from coop_drake.floor_plans.svg_style import (
     view_box,
 )
 from coop_drake.floor_plans.walls import Drawing, Wall, flatten, refuse_many
-from coop_drake.tree.pose import FloatArray
+from coop_drake.tree.arrays import FloatArray
 
 if TYPE_CHECKING:
     from xml.etree.ElementTree import Element

@@ -15,7 +15,7 @@ import numpy as np
 
 from coop_drake.errors import FloorPlanError
 from coop_drake.floor_plans.settings import UNITS, FloorPlanSettings
-from coop_drake.tree.pose import FloatArray
+from coop_drake.tree.arrays import FloatArray
 
 if TYPE_CHECKING:
     from xml.etree.ElementTree import Element

@@ -12,7 +12,7 @@ from shapely import LinearRing, LineString
 from shapely.geometry.base import BaseGeometry
 
 from coop_drake.errors import FloorPlanError
-from coop_drake.tree.pose import FloatArray
+from coop_drake.tree.arrays import FloatArray
 
 # Turns Bézier curves into chords, with a bound on the distance of the curve from them.
 

@@ -16,7 +16,7 @@ from shapely.geometry.base import BaseGeometry
 from coop_drake.geometry.polygons import polygon_rings
 from coop_drake.geometry.sweeps import following, shrunk
 from coop_drake.jit import compiled
-from coop_drake.tree.pose import FloatArray, IntArray
+from coop_drake.tree.arrays import FloatArray, IntArray
 
 # Replacements for results of geometry libraries that fail; they never prove a position free or blocked.
 

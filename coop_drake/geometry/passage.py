@@ -16,7 +16,7 @@ from shapely import LineString, Polygon
 from coop_drake.errors import GeometryError
 from coop_drake.geometry.polygons import BoundaryDistance, edges_of, extent_of, squared_distance
 from coop_drake.jit import compiled
-from coop_drake.tree.pose import FloatArray
+from coop_drake.tree.arrays import FloatArray
 
 # Cuts the edges of rings into pieces that are short where the opposite wall is near.
 

@@ -18,7 +18,7 @@ from shapely.geometry.polygon import orient
 
 from coop_drake.errors import GeometryError
 from coop_drake.jit import compiled
-from coop_drake.tree.pose import FloatArray
+from coop_drake.tree.arrays import FloatArray
 
 # The polygons among the parts of a shape, and the corners of their rings.
 

@@ -23,7 +23,7 @@ from coop_drake.geometry.polygons import (
     twice_area,
 )
 from coop_drake.jit import compiled
-from coop_drake.tree.pose import FloatArray
+from coop_drake.tree.arrays import FloatArray
 
 # Fewer vertices for a polygon, inward only: what is kept lies inside what was given.
 

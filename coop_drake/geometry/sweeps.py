@@ -7,8 +7,8 @@ from math import atan2, ceil, cos, floor, hypot, pi, sin, sqrt
 import numpy as np
 
 from coop_drake.jit import compiled
+from coop_drake.tree.arrays import FloatArray
 from coop_drake.tree.component_tree import TeamArrays, moved
-from coop_drake.tree.pose import FloatArray
 
 # Convex polygons as sets of supporting lines ``n(angle) . x <= offset``: the arithmetic of all sweeps.
 

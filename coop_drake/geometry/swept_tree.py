@@ -20,8 +20,8 @@ from coop_drake.geometry.sweeps import (
     under_prismatic,
     under_revolute,
 )
+from coop_drake.tree.arrays import FloatArray
 from coop_drake.tree.component_tree import ComponentTree, ConvexShape, TeamArrays, TreeJoint
-from coop_drake.tree.pose import FloatArray
 
 # Over- and under-footprints of the team over a compound slice, eq. (6), cached by the ancestors' slices.
 #

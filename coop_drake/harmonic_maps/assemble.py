@@ -57,7 +57,7 @@ from coop_drake.harmonic_maps.panels import (
 )
 from coop_drake.harmonic_maps.solve import CLOSE, Density, legendre_moments
 from coop_drake.jit import compiled
-from coop_drake.tree.pose import ComplexArray, FloatArray, IntArray
+from coop_drake.tree.arrays import ComplexArray, FloatArray, IntArray
 
 _REACH = 2.8
 """Distance of a far source per radius of the box: 2.8^-28 of the series is left out, 3e-13 [-]."""

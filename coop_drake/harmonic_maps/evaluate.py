@@ -18,7 +18,7 @@ import numpy as np
 from coop_drake.geometry.polygons import nearest_fraction, ray_crosses, squared_distance
 from coop_drake.harmonic_maps.panels import gauss_nodes
 from coop_drake.jit import compiled
-from coop_drake.tree.pose import FloatArray, IntArray
+from coop_drake.tree.arrays import FloatArray, IntArray
 
 REFINED_NODES = 20
 """Gauss nodes on a panel after the density has been interpolated."""

@@ -15,7 +15,7 @@ from coop_drake.geometry.polygons import edges_of, extent_of
 from coop_drake.harmonic_maps.evaluate import FlatMap, among_walls, evaluate_one
 from coop_drake.harmonic_maps.harmonic_map import HarmonicMap, as_points
 from coop_drake.jit import compiled
-from coop_drake.tree.pose import FloatArray
+from coop_drake.tree.arrays import FloatArray
 
 _STRAIGHT = 1e-6
 """Fraction of the slowdown radius within which the way to a point goal is taken as straight: closer still,

@@ -30,7 +30,7 @@ from coop_drake.harmonic_maps.outline import Outline, outline_of, region_to_map
 from coop_drake.harmonic_maps.panels import Panels, lay_panels, leg_panels
 from coop_drake.harmonic_maps.solve import Density, solve_density
 from coop_drake.jit import compiler_settings
-from coop_drake.tree.pose import ComplexArray, FloatArray, IntArray
+from coop_drake.tree.arrays import ComplexArray, FloatArray, IntArray
 
 # The harmonic map of a polygon to the unit disk, solved to a tolerance, with an estimate of its error.
 

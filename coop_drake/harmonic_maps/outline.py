@@ -13,7 +13,7 @@ from shapely.geometry.base import BaseGeometry
 from coop_drake.errors import FieldError, UnmappableError
 from coop_drake.geometry.polygons import corners_of, extent_of, parts_of
 from coop_drake.geometry.simplify import sharpest_angle, simplify_inward
-from coop_drake.tree.pose import ComplexArray, FloatArray, IntArray
+from coop_drake.tree.arrays import ComplexArray, FloatArray, IntArray
 
 _SHARPEST = 1.0
 """Corners with a smaller angle are refused: their panels would take minutes [degrees]."""

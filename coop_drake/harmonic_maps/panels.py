@@ -19,7 +19,7 @@ from numpy.polynomial import legendre
 from coop_drake.geometry.polygons import squared_distance
 from coop_drake.harmonic_maps.outline import Outline
 from coop_drake.jit import compiled
-from coop_drake.tree.pose import ComplexArray, FloatArray, IntArray
+from coop_drake.tree.arrays import ComplexArray, FloatArray, IntArray
 
 _MAX_ANGLE = np.pi / 3
 """Span of the boundary angle that one panel resolves with ten nodes to 1e-8 [rad]."""

@@ -19,7 +19,7 @@ from coop_drake.drawing import draw_polygon, new_figure
 from coop_drake.drawing.colours import BLUE, GREEN, GREY, INK, PAPER, VERMILLION, WALL
 from coop_drake.harmonic_maps.harmonic_map import HarmonicMap
 from coop_drake.harmonic_maps.outline import outline_of
-from coop_drake.tree.pose import ComplexArray, FloatArray, IntArray
+from coop_drake.tree.arrays import ComplexArray, FloatArray, IntArray
 
 _SIDE = 4.2  # height of a panel [in]
 _FINE = 400  # points on a grid line across the region

@@ -35,7 +35,7 @@ from threadpoolctl import ThreadpoolController  # type: ignore[import-untyped]
 from coop_drake.harmonic_maps.outline import Outline
 from coop_drake.harmonic_maps.panels import Nodes, Panels, corner_operator, legendre_transform, place_nodes
 from coop_drake.jit import compiled
-from coop_drake.tree.pose import ComplexArray, FloatArray, IntArray
+from coop_drake.tree.arrays import ComplexArray, FloatArray, IntArray
 
 CLOSE = 4.3
 """|zeta - 1| + |zeta + 1| below which panels are integrated exactly, zeta the target in a panel's coordinate

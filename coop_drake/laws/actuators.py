@@ -10,7 +10,7 @@ import numpy as np
 from coop_drake.jit import compiled
 from coop_drake.laws.axis_table import DECAY_RATE, FADING_TIME, RAMP_RATE
 from coop_drake.laws.ppc import CLOSING
-from coop_drake.tree.pose import FloatArray
+from coop_drake.tree.arrays import FloatArray
 
 # How the efforts of actuators follow what is asked of them.
 

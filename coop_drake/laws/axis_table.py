@@ -16,7 +16,7 @@ from coop_drake.laws.ppc import (
     speed_damping,
     track_axis,
 )
-from coop_drake.tree.pose import FloatArray
+from coop_drake.tree.arrays import FloatArray
 
 # Funnel and gains of every axis of one cell as a table of numbers, one row for each axis.
 #

@@ -8,8 +8,8 @@ import numpy as np
 
 from coop_drake.jit import compiled
 from coop_drake.laws.team_dynamics import TeamWork, frames_of, team_accelerations, team_chain, team_work
+from coop_drake.tree.arrays import FloatArray, IntArray
 from coop_drake.tree.component_tree import Bodies, ComponentTree
-from coop_drake.tree.pose import FloatArray, IntArray
 
 # How much robots that disagree about the acceleration of the object accelerate the axes.
 

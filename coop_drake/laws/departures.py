@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from coop_drake.jit import compiled
-from coop_drake.tree.pose import FloatArray
+from coop_drake.tree.arrays import FloatArray
 
 CREEP_SPEED = 0.01
 """v_c, below which Coulomb friction falls off with the speed [m/s]: small beside the speed of a transport,

@@ -21,7 +21,7 @@ from coop_drake.laws.ppc import (
     slowed_decay_rate,
     track_axis,
 )
-from coop_drake.tree.pose import FloatArray
+from coop_drake.tree.arrays import FloatArray
 from coop_drake.typed_data import (
     EXACT,
     TAGGED,

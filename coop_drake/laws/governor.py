@@ -14,7 +14,7 @@ from typing import TypeVar
 import numpy as np
 
 from coop_drake.jit import compiled
-from coop_drake.tree.pose import FloatArray
+from coop_drake.tree.arrays import FloatArray
 
 Value = TypeVar("Value", float, FloatArray)
 

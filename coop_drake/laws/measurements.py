@@ -13,7 +13,7 @@ from coop_drake.laws.robot_dynamics import (
     estimate_object,
     motion_room,
 )
-from coop_drake.tree.pose import FloatArray
+from coop_drake.tree.arrays import FloatArray
 
 # Times in control periods.
 

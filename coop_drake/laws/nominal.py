@@ -9,7 +9,7 @@ import scipy
 
 from coop_drake.jit import compiled
 from coop_drake.laws.governor import governed_acceleration
-from coop_drake.tree.pose import FloatArray
+from coop_drake.tree.arrays import FloatArray
 
 # The nominal motion of the object's position, which all robots compute alike, and its tracking.
 #

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coop_drake.jit import compiled
-from coop_drake.tree.pose import FloatArray
+from coop_drake.tree.arrays import FloatArray
 
 # Funnels: bounds of an angle or a joint that shrink from a slice to its goal interval, (17) and (39).
 

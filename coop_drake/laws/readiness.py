@@ -10,7 +10,7 @@ from coop_drake.laws.axis_table import ENERGY_BOUND, GOAL_LOWER, GOAL_UPPER, RES
 from coop_drake.laws.governor import energy_margin
 from coop_drake.laws.measurements import whole_periods
 from coop_drake.laws.robot_dynamics import PX, PY, rotated
-from coop_drake.tree.pose import FloatArray
+from coop_drake.tree.arrays import FloatArray
 
 # When a robot reports that it is ready to leave a cell, or that the goal is reached (after (10)-(12)).
 #

@@ -7,7 +7,7 @@ from math import atan2, cos, sin
 import numpy as np
 
 from coop_drake.jit import compiled
-from coop_drake.tree.pose import FloatArray, IntArray
+from coop_drake.tree.arrays import FloatArray, IntArray
 
 # Shares of the wrench that moves the object, equations (21), (27)-(29) and (31).
 #

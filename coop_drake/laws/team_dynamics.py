@@ -41,8 +41,8 @@ from coop_drake.laws.robot_dynamics import (
     rotated,
     write_motion,
 )
-from coop_drake.tree.component_tree import Bodies, ComponentTree
-from coop_drake.tree.pose import FloatArray, IntArray, PlanarPose
+from coop_drake.tree.arrays import FloatArray, IntArray
+from coop_drake.tree.component_tree import Bodies, ComponentTree, PlanarPose
 
 # Equations of motion of a whole team in the plane: one tree whose root is the object.
 #

@@ -15,8 +15,8 @@ from coop_drake.jit import compiled
 from coop_drake.planning.cells.cells import FreeBox
 from coop_drake.planning.duration import SETTLING_TIME, SPEED_PER_CLEARANCE
 from coop_drake.planning.sampling.collision import ObstacleGrid, densified, grid_inside, ring_clearance
+from coop_drake.tree.arrays import FloatArray, IntArray
 from coop_drake.tree.component_tree import ComponentTree, TeamArrays
-from coop_drake.tree.pose import FloatArray, IntArray
 
 # Compiled over-sweeps of a whole team through a box, and whether its bodies touch anywhere in it.
 

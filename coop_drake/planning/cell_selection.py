@@ -41,8 +41,8 @@ from coop_drake.planning.transitions import (
     with_gains,
 )
 from coop_drake.progress import Progress
+from coop_drake.tree.arrays import FloatArray, IntArray
 from coop_drake.tree.component_tree import nearest_turn, usual_unit
-from coop_drake.tree.pose import FloatArray, IntArray
 
 
 def quickest_plan(

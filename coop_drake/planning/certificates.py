@@ -20,8 +20,8 @@ from coop_drake.geometry.polygons import parts_of
 from coop_drake.geometry.swept_tree import BodyPair, Interval, Intervals, SweptTree
 from coop_drake.planning.cells.cells import CellMaker, Region, regions_of
 from coop_drake.planning.cells.graph import Slices
+from coop_drake.tree.arrays import FloatArray
 from coop_drake.tree.component_tree import ComponentTree
-from coop_drake.tree.pose import FloatArray
 
 # Witnesses for the exact checker: what bodies cover in a whole slice, where two overlap or are squeezed.
 

@@ -27,8 +27,8 @@ from coop_drake.planning.questions import (
     marginal_workspace,
     nearby,
 )
+from coop_drake.tree.arrays import FloatArray
 from coop_drake.tree.component_tree import nearest_turn, turns_to
-from coop_drake.tree.pose import FloatArray
 
 
 @dataclass(frozen=True)

@@ -40,7 +40,7 @@ from coop_drake.laws.readiness import (
     clearance_margin,
     position_arrival,
 )
-from coop_drake.tree.pose import FloatArray
+from coop_drake.tree.arrays import FloatArray
 
 # The time of a transition by rule of thumb, for choices made before gains are known.
 

@@ -15,8 +15,8 @@ from coop_drake.errors import TooQuickError
 from coop_drake.laws.ppc import FUNNEL_SHARE, funnel_rate
 from coop_drake.laws.readiness import RATE_TOLERANCE
 from coop_drake.planning.duration import estimated
+from coop_drake.tree.arrays import FloatArray
 from coop_drake.tree.component_tree import ComponentTree, point_levers, turn_levers, usual_unit
-from coop_drake.tree.pose import FloatArray
 
 # How limits of bases are shared among the object's speed and the rates of its angle and of the joints.
 #

@@ -33,7 +33,7 @@ from coop_drake.planning.questions import (
     shrunk,
 )
 from coop_drake.planning.sampling.sampler import Sampler, SubsystemHierarchy
-from coop_drake.tree.pose import FloatArray
+from coop_drake.tree.arrays import FloatArray
 
 TEST_SAMPLES = 8_000
 """Samples for every subsystem where it is tested whether a relaxation has a path: twice those of a first

@@ -19,8 +19,8 @@ from coop_drake.geometry.minkowski import FreeSpace, components, to_polygon
 from coop_drake.geometry.polygons import BoundaryDistance, parts_of, polygon_rings
 from coop_drake.geometry.sweeps import normals
 from coop_drake.geometry.swept_tree import Intervals
+from coop_drake.tree.arrays import FloatArray
 from coop_drake.tree.component_tree import Component, ComponentTree, TreeJoint, nearest_turn
-from coop_drake.tree.pose import FloatArray
 
 # Checks of a question before the search: finite numbers of the right count, joints within their limits.
 

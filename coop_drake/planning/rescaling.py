@@ -20,8 +20,8 @@ from coop_drake.planning.cells.exploration import ChannelSearched, Event, SliceA
 from coop_drake.planning.cells.graph import GraphCell
 from coop_drake.planning.channel import Channel, CoveredPath, NoChannel
 from coop_drake.planning.questions import SMALLEST_MARGIN
-from coop_drake.tree.component_tree import Component, ComponentTree, ConvexShape
-from coop_drake.tree.pose import FloatArray, PlanarPose
+from coop_drake.tree.arrays import FloatArray
+from coop_drake.tree.component_tree import Component, ComponentTree, ConvexShape, PlanarPose
 
 Box = TypeVar("Box", MixedCell, FreeBox, Cell)
 

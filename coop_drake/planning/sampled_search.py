@@ -35,8 +35,8 @@ from coop_drake.planning.sampling.collision import ObstacleGrid, grid_for_team, 
 from coop_drake.planning.sampling.narrow_passages import centred, repaired, widened_floor
 from coop_drake.planning.sampling.sampler import FEW_JOINTS, Sampler, SubsystemHierarchy
 from coop_drake.planning.sampling.trees import GuidePath
+from coop_drake.tree.arrays import FloatArray
 from coop_drake.tree.component_tree import configuration_scale
-from coop_drake.tree.pose import FloatArray
 
 # What comes of one attempt to sample a path and to cover it with boxes.
 

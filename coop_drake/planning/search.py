@@ -41,8 +41,8 @@ from coop_drake.planning.questions import (
 from coop_drake.planning.rescaling import Rescaling
 from coop_drake.planning.sampled_search import SampledSearch, ending_freely
 from coop_drake.progress import Progress
+from coop_drake.tree.arrays import FloatArray
 from coop_drake.tree.component_tree import usual_unit
-from coop_drake.tree.pose import FloatArray
 
 FURTHER_ATTEMPTS, ATTEMPTS_PER_ROUND = 2, 3
 """Sampled attempts after the first one, and those in every round of explorations."""

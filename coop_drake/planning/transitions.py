@@ -31,8 +31,8 @@ from coop_drake.planning.limits import (
     stated_speeds,
 )
 from coop_drake.progress import Progress
+from coop_drake.tree.arrays import FloatArray
 from coop_drake.tree.component_tree import nearest_turn
-from coop_drake.tree.pose import FloatArray
 
 # The ends of a channel: checked, turned to the start; and the goal intervals of each of its boxes.
 

@@ -12,8 +12,7 @@ from coop_drake.geometry.sweeps import normals
 from coop_drake.laws import ScheduledGains
 from coop_drake.planning.planner import plan
 from coop_drake.planning.proofs import Proofs
-from coop_drake.tree.component_tree import Body, Component, ComponentTree, ConvexShape, TreeJoint
-from coop_drake.tree.pose import PlanarPose
+from coop_drake.tree.component_tree import Body, Component, ComponentTree, ConvexShape, PlanarPose, TreeJoint
 
 BUDGET = Budget(
     control_rate=200.0, delay=0.01, lag=0.005, angle_noise=2e-4, rate_noise=2e-3, position_noise=3e-4,

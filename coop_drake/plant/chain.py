@@ -17,7 +17,8 @@ from pydrake.systems.framework import Context
 from coop_drake.errors import ScenarioError
 from coop_drake.plant.parsing import bodies_of, joints_of, refusal
 from coop_drake.scenario import Assembly, RobotAssembly, Scenario
-from coop_drake.tree.pose import FloatArray, PlanarPose
+from coop_drake.tree.arrays import FloatArray
+from coop_drake.tree.component_tree import PlanarPose
 
 MOVABLE = ("revolute", "prismatic")
 

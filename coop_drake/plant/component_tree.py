@@ -26,8 +26,8 @@ from shapely.geometry.base import BaseGeometry
 from coop_drake.plant.chain import axis_in_world, limits_of, scoped
 from coop_drake.plant.parsing import bodies_of, joints_of, refusal
 from coop_drake.plant.team import TeamPlant
-from coop_drake.tree.component_tree import Body, Component, ComponentTree, ConvexShape, TreeJoint
-from coop_drake.tree.pose import FloatArray, PlanarPose
+from coop_drake.tree.arrays import FloatArray
+from coop_drake.tree.component_tree import Body, Component, ComponentTree, ConvexShape, PlanarPose, TreeJoint
 
 _FEW = 16
 """Footprints with at most this many corners are not simplified."""

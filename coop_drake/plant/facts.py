@@ -22,8 +22,8 @@ from coop_drake.plant.planar_model import bodies_inertia, rotor_inertia
 from coop_drake.plant.team import TeamPlant, build_team_plant, displacement
 from coop_drake.scenario import Floor, Messages, Scenario
 from coop_drake.scenario.budget_file import ALL, POSITION, TeamMasses, read_budget
+from coop_drake.tree.arrays import FloatArray
 from coop_drake.tree.component_tree import Bodies, ComponentTree
-from coop_drake.tree.pose import FloatArray
 from coop_drake.typed_data import to_plain
 
 if TYPE_CHECKING:  # Simulating takes a digest from here, and should not wait for the verifier.

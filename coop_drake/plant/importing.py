@@ -23,7 +23,7 @@ from coop_drake.files import check_readable
 from coop_drake.plant.chain import TILT, axis_in_world, is_circle, is_upright, limits_of
 from coop_drake.plant.parsing import joints_of
 from coop_drake.plant.problem import limit_notes
-from coop_drake.tree.pose import FloatArray
+from coop_drake.tree.arrays import FloatArray
 
 if TYPE_CHECKING:
     from xml.etree.ElementTree import Element

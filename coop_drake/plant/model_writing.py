@@ -13,7 +13,7 @@ from shapely import Polygon, constrained_delaunay_triangles
 from coop_drake.drawing.colours import BASE_IN_MODELS, LINK_IN_MODELS, OBJECT_IN_MODELS
 from coop_drake.errors import GeometryError
 from coop_drake.files import write_atomically
-from coop_drake.tree.pose import FloatArray
+from coop_drake.tree.arrays import FloatArray
 
 # Bodies that are polygons, in convex parts.
 

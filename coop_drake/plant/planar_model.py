@@ -28,8 +28,8 @@ from coop_drake.laws.robot_dynamics import (
 )
 from coop_drake.plant.component_tree import base_components, component_bodies
 from coop_drake.plant.team import RobotModel, RobotPlant, TeamPlant
+from coop_drake.tree.arrays import FloatArray, IntArray
 from coop_drake.tree.component_tree import ComponentTree
-from coop_drake.tree.pose import FloatArray, IntArray
 
 # Reads planar chains, the form that the compiled laws take, from Drake's models.
 

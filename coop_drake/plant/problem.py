@@ -24,8 +24,8 @@ from coop_drake.plant.team import RobotModel, TeamPlant, build_team_plant
 from coop_drake.scenario import Scenario, assemble
 from coop_drake.scenario.deployment import ALL_ROBOTS
 from coop_drake.scenario.model import RobotLimits
-from coop_drake.tree.component_tree import Body, ComponentTree, ConvexShape
-from coop_drake.tree.pose import FloatArray, PlanarPose
+from coop_drake.tree.arrays import FloatArray
+from coop_drake.tree.component_tree import Body, ComponentTree, ConvexShape, PlanarPose
 
 if TYPE_CHECKING:
     from xml.etree.ElementTree import Element

@@ -18,7 +18,7 @@ from coop_drake.plant.chain import find_base, fix_joints, object_frame, planar_p
 from coop_drake.plant.parsing import add_models, finalize, set_actuators
 from coop_drake.plant.team import RobotModel, TeamPlant, build_team_plant
 from coop_drake.scenario import Assembly, Scenario
-from coop_drake.tree.pose import FloatArray
+from coop_drake.tree.arrays import FloatArray
 
 
 class ConstrainedGrasp(NamedTuple):

@@ -36,7 +36,8 @@ from coop_drake.plant.chain import (
     scoped,
 )
 from coop_drake.scenario import Assembly, Deployment, RobotAssembly, Scenario, assemble
-from coop_drake.tree.pose import FloatArray, PlanarPose
+from coop_drake.tree.arrays import FloatArray
+from coop_drake.tree.component_tree import PlanarPose
 
 # The team as one plant, rooted at the object.
 

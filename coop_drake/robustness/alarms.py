@@ -12,7 +12,7 @@ from coop_drake.answers.budget import Alarms, AxisTracking, Budget, PositionTube
 from coop_drake.laws.measurements import whole_periods
 from coop_drake.laws.readiness import unseen_time
 from coop_drake.robustness.nominal_axes import AxisSets
-from coop_drake.tree.pose import FloatArray
+from coop_drake.tree.arrays import FloatArray
 
 if TYPE_CHECKING:
     from coop_drake.robustness.axis_departure import Departures, Inflow

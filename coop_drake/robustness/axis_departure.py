@@ -35,7 +35,7 @@ from coop_drake.laws.measurements import whole_periods
 from coop_drake.laws.nominal import lag_factors
 from coop_drake.robustness.alarms import axis_errors, mistaken, unseen_of
 from coop_drake.robustness.nominal_axes import AxisSets, even_sets
-from coop_drake.tree.pose import FloatArray
+from coop_drake.tree.arrays import FloatArray
 
 MODEL_PARTS = 5
 """Parts into which the range of the model's error is cut [-]; within each only the rest is a disturbance."""

@@ -21,7 +21,7 @@ from coop_drake.robustness.waves import (
     vector_product,
 )
 from coop_drake.tree import ComponentTree, TreeJoint
-from coop_drake.tree.pose import FloatArray, IntArray
+from coop_drake.tree.arrays import FloatArray, IntArray
 
 
 class Precision(NamedTuple):

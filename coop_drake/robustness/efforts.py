@@ -24,7 +24,7 @@ from coop_drake.robustness.alarms import axis_errors
 from coop_drake.robustness.axis_departure import COMMANDED, OLD, PULL, AxisLoop, Departures
 from coop_drake.robustness.couplings import Efforts
 from coop_drake.robustness.nominal_axes import AxisSets
-from coop_drake.tree.pose import FloatArray
+from coop_drake.tree.arrays import FloatArray
 
 
 class LimitedEfforts(NamedTuple):

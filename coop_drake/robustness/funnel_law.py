@@ -28,7 +28,7 @@ from coop_drake.laws.axis_table import (
     track_row,
 )
 from coop_drake.laws.ppc import CLOSING, fading, ramped_gain, track_axis, track_distances
-from coop_drake.tree.pose import FloatArray
+from coop_drake.tree.arrays import FloatArray
 
 LAW = QUINTIC_FUNNELS
 """Name and version of this law; a plan whose sets are for another one is refused."""

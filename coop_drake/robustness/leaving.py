@@ -19,7 +19,7 @@ from coop_drake.robustness.nominal_axes import (
     V,
     X,
 )
-from coop_drake.tree.pose import FloatArray
+from coop_drake.tree.arrays import FloatArray
 
 EARLIER = 4
 """By how many samples earlier a cell may be left than the tubes say [-]: rounding moves rests by far less."""

@@ -34,7 +34,7 @@ from coop_drake.robustness.funnel_law import (
     line_at_rest,
     slowest_rate,
 )
-from coop_drake.tree.pose import FloatArray
+from coop_drake.tree.arrays import FloatArray
 
 X, X_REACH, V, V_REACH, ACCELERATION, DISTANCE, COMMAND, COMMAND_REACH = range(8)
 COLUMNS = 8

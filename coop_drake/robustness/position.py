@@ -14,7 +14,7 @@ from coop_drake.answers.budget import Budget, PositionTube
 from coop_drake.jit import compiled
 from coop_drake.laws.measurements import whole_periods
 from coop_drake.robustness.alarms import unseen_of
-from coop_drake.tree.pose import FloatArray
+from coop_drake.tree.arrays import FloatArray
 
 MODEL_PARTS = 10
 """Parts into which the range of the model's error is cut [-]; within each only the rest is a disturbance."""

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from coop_drake.tree import ComponentTree
-from coop_drake.tree.pose import FloatArray, IntArray
+from coop_drake.tree.arrays import FloatArray, IntArray
 
 NOTHING = 1e-12
 """Waves that are smaller are left over by rounding [kg m^2 or less]."""

@@ -15,7 +15,7 @@ from coop_drake.floor_plans.settings import Scale, Tolerance, Unit
 from coop_drake.harmonic_maps import TOLERANCE
 from coop_drake.laws.gains import FixedGains, GainSet, ScheduledGains
 from coop_drake.scenario.deployment import Deployment, with_preset
-from coop_drake.tree.pose import PlanarPose
+from coop_drake.tree.component_tree import PlanarPose
 from coop_drake.typed_data import HIDDEN, Codec, Limits, NotNegative, Positive, Real
 
 if TYPE_CHECKING:

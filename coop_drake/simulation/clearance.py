@@ -21,8 +21,8 @@ from coop_drake.geometry.polygons import (
     squared_ring_distance,
 )
 from coop_drake.jit import compiled
+from coop_drake.tree.arrays import FloatArray
 from coop_drake.tree.component_tree import ComponentTree, TeamArrays, moved, place_into
-from coop_drake.tree.pose import FloatArray
 
 
 @compiled(borrows=True)

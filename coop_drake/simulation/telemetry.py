@@ -18,7 +18,7 @@ from coop_drake.diagram.closed_loop import Loop, PortRow
 from coop_drake.geometry.polygons import BoundaryDistance, signed_distance
 from coop_drake.laws import total_wrench
 from coop_drake.simulation.clearance import TeamClearance, team_distances
-from coop_drake.tree.pose import FloatArray, IntArray
+from coop_drake.tree.arrays import FloatArray, IntArray
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ from coop_drake.laws.actuators import lag_behind, limit_efforts
 from coop_drake.laws.robot_dynamics import end_effector_command, motion_room, robot_effort
 from coop_drake.plant import RobotPlant, robot_chain
 from coop_drake.systems.block import Block, Law
-from coop_drake.tree.pose import FloatArray
+from coop_drake.tree.arrays import FloatArray
 
 
 class WrenchLaw(Law):

@@ -10,7 +10,7 @@ import numpy as np
 from pydrake.systems.framework import BasicVector, Context, Diagram, InputPort, LeafSystem
 from pydrake.systems.primitives import Selector, SelectorParams
 
-from coop_drake.tree.pose import FloatArray
+from coop_drake.tree.arrays import FloatArray
 
 CURRENT_CELL_SIZE = 2
 """Size of the message of the current cell: its index [-] and the time of its entry [s]."""

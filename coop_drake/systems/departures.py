@@ -21,7 +21,7 @@ from coop_drake.plant import TeamPlant, read_component_tree, read_team_tree
 from coop_drake.plant.planar_model import TeamTree
 from coop_drake.scenario import BlockedWheels, Deployment, Floor, JointFriction, WheelSlip
 from coop_drake.systems.block import Law
-from coop_drake.tree.pose import FloatArray, IntArray
+from coop_drake.tree.arrays import FloatArray, IntArray
 
 _STILL = np.empty((0, 2))
 """Velocities of bases, where no friction of the floor reads them."""

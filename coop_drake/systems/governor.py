@@ -17,7 +17,7 @@ from coop_drake.laws.nominal import nominal_flow, track_nominal
 from coop_drake.laws.ppc import governed_gains
 from coop_drake.systems import kernels
 from coop_drake.systems.block import CLOCK_SIZE, CURRENT_CELL_SIZE, Block, clock_of, index_of
-from coop_drake.tree.pose import FloatArray
+from coop_drake.tree.arrays import FloatArray
 
 
 @dataclass(frozen=True)

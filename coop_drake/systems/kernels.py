@@ -36,7 +36,7 @@ from coop_drake.laws.readiness import (
     clearance_margin,
     position_arrival,
 )
-from coop_drake.tree.pose import FloatArray
+from coop_drake.tree.arrays import FloatArray
 
 # What a robot computes in one cell, in one compiled call each: governors and readiness.
 

@@ -22,7 +22,7 @@ from coop_drake.laws.measurements import (
 from coop_drake.laws.robot_dynamics import estimate_object, motion_room, read_robot
 from coop_drake.plant import RobotPlant, SeparateTeam, TeamPlant, base_chain, robot_chain
 from coop_drake.systems.block import Block, Law, build_selector
-from coop_drake.tree.pose import FloatArray
+from coop_drake.tree.arrays import FloatArray
 
 
 class TeamSensor(Law):

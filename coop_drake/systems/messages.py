@@ -18,7 +18,7 @@ from coop_drake.laws.measurements import (
     whole_periods,
 )
 from coop_drake.systems.block import READY_SIZE, Block
-from coop_drake.tree.pose import FloatArray
+from coop_drake.tree.arrays import FloatArray
 
 
 class MessageChannel(Block):

@@ -13,7 +13,7 @@ from coop_drake.laws import readiness
 from coop_drake.laws.robot_dynamics import estimate_object, motion_room
 from coop_drake.systems.block import ALARM_SIZE, CURRENT_CELL_SIZE, Block, index_of
 from coop_drake.systems.kernels import NOMINAL_SIZE
-from coop_drake.tree.pose import FloatArray
+from coop_drake.tree.arrays import FloatArray
 
 LONG_AGO = -1e9
 """When something was above its level the last time, before anything was [s]."""

@@ -12,7 +12,7 @@ from coop_drake.systems import kernels
 from coop_drake.systems.block import ALARM_SIZE, CURRENT_CELL_SIZE, READY_SIZE, Block, index_of
 from coop_drake.systems.governor import GovernedCell
 from coop_drake.systems.ppc import AxisLaw
-from coop_drake.tree.pose import FloatArray
+from coop_drake.tree.arrays import FloatArray
 
 
 class ReadyMonitor(Block):

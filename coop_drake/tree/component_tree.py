@@ -14,8 +14,41 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from coop_drake.jit import compiled
-from coop_drake.tree.pose import FloatArray, IntArray, PlanarPose
+from coop_drake.tree.arrays import FloatArray, IntArray
 from coop_drake.typed_data import Number
+
+
+@dataclass(frozen=True)
+class PlanarPose:
+    """The pose ``X_AB`` of frame B measured in frame A, in Drake's notation: a rigid motion of the plane.
+
+    Attributes:
+        x: First coordinate of B's origin in A [m].
+        y: Second coordinate of B's origin in A [m].
+        angle: Rotation from A to B, counter-clockwise [rad], not wrapped.
+    """
+
+    x: float = 0.0
+    y: float = 0.0
+    angle: float = 0.0
+
+    def __matmul__(self, other: PlanarPose) -> PlanarPose:
+        """Compose: ``X_AC = X_AB @ X_BC``."""
+        c, s = cos(self.angle), sin(self.angle)
+        return PlanarPose(
+            self.x + c * other.x - s * other.y, self.y + s * other.x + c * other.y, self.angle + other.angle
+        )
+
+    def inverse(self) -> PlanarPose:
+        """Return ``X_BA``."""
+        c, s = cos(self.angle), sin(self.angle)
+        return PlanarPose(-c * self.x - s * self.y, s * self.x - c * self.y, -self.angle)
+
+    def apply(self, points: FloatArray) -> FloatArray:
+        """Map points given in B to A; shape (..., 2) [m] to the same shape."""
+        c, s = cos(self.angle), sin(self.angle)
+        moved: FloatArray = points @ np.array([[c, s], [-s, c]]) + np.array([self.x, self.y])
+        return moved
 
 
 @dataclass(frozen=True)
@@ -204,26 +237,13 @@ class ComponentTree:
         return team_arrays(self)
 
     def poses(self, configuration: Sequence[float] | FloatArray) -> tuple[PlanarPose, ...]:
-        """Pose ``X_WC`` of every component, the numbers of the compiled ``place``.
+        """Pose ``X_WC`` of every component, see ``place``.
 
         Args:
             configuration: z = (x, y, theta, q...), shape (3 + n,) [m, rad].
         """
-        x, y, theta, *q = (float(value) for value in configuration)
-        poses: list[PlanarPose] = []
-        for component in self.components:
-            joint, parent = component.joint, component.parent
-            if joint is None or parent is None:
-                poses.append(PlanarPose(x, y, theta))
-                continue
-            X_PJ, value = poses[parent] @ joint.X_PJ, q[joint.index]
-            if joint.kind == "revolute":
-                poses.append(PlanarPose(X_PJ.x, X_PJ.y, X_PJ.angle + joint.sign * value))
-            else:
-                c, s, (ax, ay) = cos(X_PJ.angle), sin(X_PJ.angle), joint.axis
-                moved = X_PJ.x + (c * ax - s * ay) * value, X_PJ.y + (s * ax + c * ay) * value
-                poses.append(PlanarPose(*moved, X_PJ.angle))
-        return tuple(poses)
+        rows = place(self.arrays, np.asarray(configuration, dtype=float))
+        return tuple(PlanarPose(x, y, angle) for x, y, _, _, angle in rows.tolist())
 
     @cached_property
     def reach(self) -> float:

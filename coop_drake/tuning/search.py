@@ -26,7 +26,7 @@ from coop_drake.planning import reschedule
 from coop_drake.planning.planner import plan
 from coop_drake.scenario import Scenario, load_scenario
 from coop_drake.simulation import build_maps, simulate
-from coop_drake.tree.pose import FloatArray
+from coop_drake.tree.arrays import FloatArray
 from coop_drake.tuning.objective import CRITERIA, GainTrial, Objective, TrialOutcome, outcome_of
 
 # Trials of gain sets: a plan is run with other gains, by the compiled loop where it knows the team.

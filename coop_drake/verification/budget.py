@@ -68,7 +68,7 @@ from coop_drake.robustness.nominal_axes import (
 )
 from coop_drake.robustness.position import PositionGains, position_bounds, position_may_rest
 from coop_drake.tree import ComponentTree
-from coop_drake.tree.pose import FloatArray
+from coop_drake.tree.arrays import FloatArray
 from coop_drake.verification.checks import Check
 
 ROUNDING, LEAST = 1e-9, 1e-12

@@ -15,8 +15,8 @@ from coop_drake.errors import RefusalError
 from coop_drake.laws import GainSet, ScheduledGains, TransitionGains, transition_gains
 from coop_drake.laws.gains import IDEAL_AGE, RestCondition, schedule_of
 from coop_drake.planning.duration import estimated
+from coop_drake.tree.arrays import FloatArray
 from coop_drake.tree.component_tree import ComponentTree, usual_unit
-from coop_drake.tree.pose import FloatArray
 from coop_drake.verification.checks import Check
 from coop_drake.verification.runs.bodies import component_stages, levers
 from coop_drake.verification.runs.laws import SHAPES

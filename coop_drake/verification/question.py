@@ -13,8 +13,7 @@ from shapely import Polygon
 
 from coop_drake.answers.problem import PlanningProblem
 from coop_drake.files import write_atomically
-from coop_drake.tree.component_tree import Component, ComponentTree
-from coop_drake.tree.pose import PlanarPose
+from coop_drake.tree.component_tree import Component, ComponentTree, PlanarPose
 
 TRUSTED = (
     "the readers of the scenario, the plan and the proof (coop_drake/scenario, coop_drake/answers)",

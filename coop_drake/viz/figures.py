@@ -22,8 +22,8 @@ from coop_drake.answers.speeds import base_speeds
 from coop_drake.drawing import canvas
 from coop_drake.drawing.colours import BLUE, GREEN, GREY, INK, OBJECT, OUTSIDE, SKY, robot_colour
 from coop_drake.files import write_atomically
+from coop_drake.tree.arrays import FloatArray
 from coop_drake.tree.component_tree import ComponentTree
-from coop_drake.tree.pose import FloatArray
 from coop_drake.viz.drawing_processes import joints_figure_name
 
 # Figures on the floor plan: question and plan, start and goal (Figure 4), path and footprints (Figure 5).

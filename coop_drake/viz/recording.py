@@ -23,7 +23,7 @@ from coop_drake.errors import CoopDrakeError
 from coop_drake.files import write_atomically
 from coop_drake.scenario import Scenario
 from coop_drake.templates import rendered
-from coop_drake.tree.pose import FloatArray
+from coop_drake.tree.arrays import FloatArray
 from coop_drake.viz.scene import (
     ABOVE,
     CELL_COLOUR,

@@ -56,7 +56,7 @@ from coop_drake.geometry.polygons import component_at, parts_of
 from coop_drake.plant import TeamPlant, build_team_plant, read_component_tree, set_configuration
 from coop_drake.plant.parsing import bodies_of
 from coop_drake.scenario import Scenario
-from coop_drake.tree.pose import FloatArray
+from coop_drake.tree.arrays import FloatArray
 
 # Meshes and colours as Meshcat takes them.
 

@@ -20,8 +20,8 @@ from coop_drake.geometry.swept_tree import Interval
 from coop_drake.planning.cells.cells import Region
 from coop_drake.planning.cells.exploration import Verdict
 from coop_drake.planning.cells.graph import Kind, holds, share_facet
+from coop_drake.tree.arrays import FloatArray
 from coop_drake.tree.component_tree import nearest_turn, turns_to
-from coop_drake.tree.pose import FloatArray
 from coop_drake.watching.recording import (
     BOXES,
     ChannelCell,

@@ -30,7 +30,7 @@ from coop_drake.geometry.polygons import parts_of
 from coop_drake.geometry.swept_tree import Interval, Intervals
 from coop_drake.planning.cells.graph import Kind
 from coop_drake.progress import Progress
-from coop_drake.tree.pose import FloatArray
+from coop_drake.tree.arrays import FloatArray
 from coop_drake.watching.keyframes import THETA, Components, Keyframe, PathPiece, on_turn, union
 from coop_drake.watching.recording import ChannelCell, Leaf, SearchRecording
 

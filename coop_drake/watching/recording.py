@@ -31,7 +31,7 @@ from coop_drake.planning.channel import Channel
 from coop_drake.planning.questions import marginal_workspace
 from coop_drake.planning.search import find_channel
 from coop_drake.progress import Progress
-from coop_drake.tree.pose import FloatArray
+from coop_drake.tree.arrays import FloatArray
 
 # Recording a search: one planning problem, and all events while the planner answers it.
 

@@ -40,7 +40,7 @@ from coop_drake.files import write_atomically
 from coop_drake.geometry.polygons import parts_of
 from coop_drake.geometry.swept_tree import Interval
 from coop_drake.planning.cells.graph import Kind
-from coop_drake.tree.pose import FloatArray
+from coop_drake.tree.arrays import FloatArray
 from coop_drake.watching.keyframes import THETA, Keyframe, PathPiece, layers, on_turn, union
 from coop_drake.watching.recording import SearchRecording
 

@@ -5,8 +5,7 @@ import pytest
 from shapely import box
 
 from coop_drake.diagnosis.contacts import contacts, deepest, narrowest_gap, overlaps
-from coop_drake.tree.component_tree import Body, Component, ComponentTree, TreeJoint
-from coop_drake.tree.pose import PlanarPose
+from coop_drake.tree.component_tree import Body, Component, ComponentTree, PlanarPose, TreeJoint
 from tests.support.cases import disc, rectangle, team_tree
 
 ROOM = box(0.0, 0.0, 4.0, 1.0)

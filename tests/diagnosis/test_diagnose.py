@@ -14,8 +14,7 @@ from coop_drake.diagnosis.diagnosing import SLICES, changes, find_passages, try_
 from coop_drake.diagnosis.variants import BudgetedPlanner, WidenedFloor, on_open_floor
 from coop_drake.drawing import save_figure
 from coop_drake.planning import Channel, find_channel
-from coop_drake.tree.component_tree import Body, Component, ComponentTree, TreeJoint
-from coop_drake.tree.pose import PlanarPose
+from coop_drake.tree.component_tree import Body, Component, ComponentTree, PlanarPose, TreeJoint
 from tests.support.cases import case, rectangle
 
 ROD = 0.2

@@ -23,7 +23,7 @@ from coop_drake.geometry.sweeps import (
     under_revolute,
 )
 from coop_drake.geometry.swept_tree import inscribed
-from coop_drake.tree.component_tree import place
+from coop_drake.tree.component_tree import PlanarPose
 from tests.support.trees import trees
 
 SQUARE = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
@@ -206,11 +206,18 @@ def test_no_point_of_the_team_is_beyond_its_reach(data: st.DataObject) -> None:
 
 @settings(max_examples=40)
 @given(st.data())
-def test_compiled_poses_are_the_same_numbers(data: st.DataObject) -> None:
+def test_poses_follow_one_from_the_other_along_the_joints(data: st.DataObject) -> None:
+    """Eq. (3): a joint's frame stands on the parent, and the child turns or slides in it."""
     tree = data.draw(trees())
     random = np.random.default_rng(data.draw(st.integers(0, 1000)))
     z = random.normal(size=3 + len(tree.joints))
-    rows = place(tree.arrays, z)
-    assert [(pose.x, pose.y, pose.angle) for pose in tree.poses(z)] == [
-        tuple(row) for row in rows[:, [0, 1, 4]].tolist()
-    ]
+    poses = tree.poses(z)
+    assert poses[0] == PlanarPose(*z[:3])
+    for X_WC, component in zip(poses[1:], tree.components[1:], strict=True):
+        joint, q = component.joint, z[3 + component.joint.index]
+        turns = joint.kind == "revolute"
+        X_JC = PlanarPose(angle=joint.sign * q) if turns else PlanarPose(*(q * np.array(joint.axis)))
+        expected = poses[component.parent] @ joint.X_PJ @ X_JC
+        np.testing.assert_allclose(
+            [X_WC.x, X_WC.y, X_WC.angle], [expected.x, expected.y, expected.angle], rtol=0.0, atol=1e-12
+        )

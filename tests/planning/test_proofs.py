@@ -18,8 +18,7 @@ from coop_drake.planning.planner import plan
 from coop_drake.planning.proofs import MANY_CORNERS, Proofs, blocked_goal, clearance_bound, refuted_at_an_end
 from coop_drake.planning.questions import relaxed
 from coop_drake.planning.sampling.sampler import DISC_SHRINKAGE, DISC_TOLERANCE, guiding_disc
-from coop_drake.tree.component_tree import Body, Component, ComponentTree, ConvexShape, TreeJoint
-from coop_drake.tree.pose import PlanarPose
+from coop_drake.tree.component_tree import Body, Component, ComponentTree, ConvexShape, PlanarPose, TreeJoint
 from coop_drake.verification import verify_proof
 from tests.planning.test_search import rod_problem
 from tests.support.cases import case, rectangle, transport

@@ -18,8 +18,7 @@ from coop_drake.planning.channel import Channel, NoChannel
 from coop_drake.planning.duration import timed
 from coop_drake.planning.planner import plan
 from coop_drake.planning.search import find_channel
-from coop_drake.tree.component_tree import Body, Component, ComponentTree, ConvexShape, TreeJoint
-from coop_drake.tree.pose import PlanarPose
+from coop_drake.tree.component_tree import Body, Component, ComponentTree, ConvexShape, PlanarPose, TreeJoint
 from coop_drake.verification import verify_plan, verify_proof
 from tests.support.cases import case, disc, rectangle, transport
 from tests.support.moved import Similarity

@@ -17,8 +17,7 @@ from coop_drake.plant.chain import planar_pose
 from coop_drake.plant.component_tree import hull, project
 from coop_drake.plant.problem import body_clearance, core, wall_clearance
 from coop_drake.scenario import load_scenario
-from coop_drake.tree.component_tree import Body, ConvexShape
-from coop_drake.tree.pose import PlanarPose
+from coop_drake.tree.component_tree import Body, ConvexShape, PlanarPose
 from tests.support.cases import CASES, case
 from tests.support.edited_scenario import shipped, team_of, write_edited, write_with_robot
 from tests.support.robot_models import Arm

@@ -15,7 +15,7 @@ from coop_drake.plant import planning_problem
 from coop_drake.plant.model_writing import convex_parts, planar_mass, polygon_body_files, write_polygon_body
 from coop_drake.plant.problem import core
 from coop_drake.scenario import load_scenario
-from coop_drake.tree.pose import PlanarPose
+from coop_drake.tree.component_tree import PlanarPose
 from tests.support.edited_scenario import team_of, write_edited
 
 U_SHAPE = [

@@ -27,7 +27,7 @@ from coop_drake.plant import (
 )
 from coop_drake.scenario import load_scenario
 from coop_drake.systems import RobotEffort
-from coop_drake.tree.pose import PlanarPose
+from coop_drake.tree.component_tree import PlanarPose
 from tests.support.cases import GRASPS
 from tests.support.configuration import get_configuration, get_rates
 from tests.support.edited_scenario import MODELS, exchanged, shipped, team_of, write_edited, write_with_robot

@@ -9,8 +9,7 @@ import numpy as np
 from shapely.affinity import affine_transform
 
 from coop_drake.answers.problem import PlanningProblem
-from coop_drake.tree.component_tree import Body, Component, ComponentTree, ConvexShape, TreeJoint
-from coop_drake.tree.pose import PlanarPose
+from coop_drake.tree.component_tree import Body, Component, ComponentTree, ConvexShape, PlanarPose, TreeJoint
 
 
 @dataclass(frozen=True)

@@ -8,8 +8,7 @@ import numpy as np
 from shapely import Polygon, box, union_all
 
 from coop_drake.answers.problem import PlannerSettings, PlanningProblem
-from coop_drake.tree.component_tree import Body, Component, ComponentTree, ConvexShape, TreeJoint
-from coop_drake.tree.pose import PlanarPose
+from coop_drake.tree.component_tree import Body, Component, ComponentTree, ConvexShape, PlanarPose, TreeJoint
 from tests.support.cases import disc, rectangle
 
 SETTINGS = PlannerSettings()

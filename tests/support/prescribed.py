@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from coop_drake.laws.ppc import SATURATION, FunnelBounds, track_axis
-from coop_drake.tree.pose import FloatArray
+from coop_drake.tree.arrays import FloatArray
 
 
 def prescribed_acceleration(

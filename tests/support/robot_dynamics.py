@@ -9,7 +9,7 @@ from pydrake.multibody.tree import JacobianWrtVariable, MultibodyForces
 
 from coop_drake.plant import RobotPlant, build_robot_plant
 from coop_drake.scenario import Scenario
-from coop_drake.tree.pose import FloatArray
+from coop_drake.tree.arrays import FloatArray
 
 _PLANAR = [3, 4, 2]
 """Drake's spatial order is rotation first; the plane's is (x, y, rotation)."""

@@ -32,7 +32,7 @@ from coop_drake.systems import Block
 from coop_drake.systems.block import ALARM_SIZE
 from coop_drake.systems.departures import tilt_floor
 from coop_drake.systems.kernels import nominal_margins
-from coop_drake.tree.pose import FloatArray
+from coop_drake.tree.arrays import FloatArray
 
 SHOWN = 20
 """Numbers that a robot shows: pose of its base (3), p_G (2), Delta E, its report (2), what its monitor says

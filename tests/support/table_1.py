@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from coop_drake.tree.pose import FloatArray
+from coop_drake.tree.arrays import FloatArray
 from paper.table_1 import ANGLE_TOLERANCE, GOAL_ANGLE, START
 
 

@@ -13,8 +13,7 @@ from coop_drake.errors import RefusalError
 from coop_drake.laws import ScheduledGains
 from coop_drake.planning.planner import plan
 from coop_drake.planning.transitions import reschedule
-from coop_drake.tree.component_tree import Body, Component, ComponentTree, ConvexShape, TreeJoint
-from coop_drake.tree.pose import PlanarPose
+from coop_drake.tree.component_tree import Body, Component, ComponentTree, ConvexShape, PlanarPose, TreeJoint
 from coop_drake.verification import verify_plan, verify_proof
 from tests.support.certificates import GAINS, bent_corridor
 

@@ -7,8 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from coop_drake.answers.problem import PlanningProblem
-from coop_drake.tree.component_tree import Component, ComponentTree, TreeJoint
-from coop_drake.tree.pose import PlanarPose
+from coop_drake.tree.component_tree import Component, ComponentTree, PlanarPose, TreeJoint
 from coop_drake.watching import SearchRecording, Strategy, record_search
 from tests.planning.test_search import rod_problem
 

@@ -49,7 +49,7 @@ from coop_drake.robustness.nominal_axes import (
     axis_sets,
     comes_near_limit,
 )
-from coop_drake.tree.pose import FloatArray
+from coop_drake.tree.arrays import FloatArray
 
 REST_SHARE = 0.05
 """Largest distance from the middle of a goal interval with which a nominal motion may leave a cell, over the

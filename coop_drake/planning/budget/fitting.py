@@ -51,7 +51,7 @@ from coop_drake.robustness.efforts import (
     even_efforts,
     single_noise,
 )
-from coop_drake.tree.pose import FloatArray
+from coop_drake.tree.arrays import FloatArray
 
 STIFFNESSES = (100.0, 150.0, 200.0, 250.0, 300.0, 400.0, 500.0, 700.0, 1000.0)
 """K_a that are tried [1/s^2]; the narrowest tube is taken."""

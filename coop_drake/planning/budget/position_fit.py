@@ -29,7 +29,7 @@ from coop_drake.planning.duration import plan_time, timed
 from coop_drake.planning.transitions import find_route
 from coop_drake.robustness.alarms import alarms_of, position_room, rubbed
 from coop_drake.robustness.position import PositionGains, position_tubes
-from coop_drake.tree.pose import FloatArray
+from coop_drake.tree.arrays import FloatArray
 
 SPEEDS = (2.0, 1.6, 1.3, 1.0, 0.7, 0.5, 0.35, 0.2)
 """Largest speeds of p_G that are tried, in this order [m/s]: slow motions have narrow tubes, and take small

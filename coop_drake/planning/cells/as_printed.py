@@ -10,7 +10,7 @@ from coop_drake.answers.problem import PlanningProblem
 from coop_drake.planning.cells.cells import Region
 from coop_drake.planning.cells.exploration import ExplorationResult, SliceSplit, Subdivision, Verdict, Watch
 from coop_drake.planning.cells.graph import CellGraph, GraphCell, Kind
-from coop_drake.tree.pose import FloatArray
+from coop_drake.tree.arrays import FloatArray
 
 End = tuple[list[float | None], FloatArray]
 

@@ -18,7 +18,8 @@ from coop_drake.geometry.polygons import BoundaryDistance, squared_distance
 from coop_drake.geometry.sweeps import edge_directions, following, support
 from coop_drake.geometry.swept_tree import Intervals, SweptTree
 from coop_drake.jit import compiled
-from coop_drake.tree.pose import FloatArray, PlanarPose
+from coop_drake.tree.arrays import FloatArray
+from coop_drake.tree.component_tree import PlanarPose
 
 NEGLIGIBLE_AREA = 1e-9
 """Under-cells with less area are dropped: they are remnants of rounding [m^2]."""

@@ -28,8 +28,8 @@ from coop_drake.planning.sampling.sampler import (
     Sampler,
     SubsystemHierarchy,
 )
+from coop_drake.tree.arrays import FloatArray
 from coop_drake.tree.component_tree import ComponentTree, TeamArrays, configuration_scale, place_into
-from coop_drake.tree.pose import FloatArray
 
 # Compiled elastic-band smoothing: paths become shorter in every axis and move away from obstacles.
 

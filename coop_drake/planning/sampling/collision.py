@@ -24,8 +24,8 @@ from coop_drake.geometry.polygons import (
 )
 from coop_drake.geometry.sweeps import following
 from coop_drake.jit import compiled
+from coop_drake.tree.arrays import FloatArray, IntArray
 from coop_drake.tree.component_tree import TeamArrays, place_into
-from coop_drake.tree.pose import FloatArray, IntArray
 
 # Samples added to a path, so that neighbours are near to each other.
 

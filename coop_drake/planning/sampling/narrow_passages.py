@@ -17,8 +17,8 @@ from coop_drake.jit import compiled
 from coop_drake.planning.questions import nearby
 from coop_drake.planning.sampling.band import clearances, improved
 from coop_drake.planning.sampling.collision import densified, first_collision, grid_for_team, is_free
+from coop_drake.tree.arrays import FloatArray, IntArray
 from coop_drake.tree.component_tree import TeamArrays, configuration_scale, moved, place_into
-from coop_drake.tree.pose import FloatArray, IntArray
 
 if TYPE_CHECKING:
     from scipy.optimize import LinearConstraint

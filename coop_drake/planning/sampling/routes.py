@@ -18,7 +18,7 @@ from coop_drake.jit import compiled
 from coop_drake.planning.questions import check_question, relaxed
 from coop_drake.planning.sampling.collision import centres_inside
 from coop_drake.planning.sampling.sampler import disc_question
-from coop_drake.tree.pose import FloatArray, IntArray
+from coop_drake.tree.arrays import FloatArray, IntArray
 
 # A short route for a disc across a floor of any size, by A* on squares.
 #

@@ -27,6 +27,7 @@ from coop_drake.planning.sampling.trees import (
     joined,
     shortened,
 )
+from coop_drake.tree.arrays import FloatArray
 from coop_drake.tree.component_tree import (
     Body,
     Component,
@@ -36,7 +37,6 @@ from coop_drake.tree.component_tree import (
     configuration_scale,
     place,
 )
-from coop_drake.tree.pose import FloatArray
 
 # The hierarchy of subsystems that paths are sampled for: a disc, the object, some robots, the whole team.
 

@@ -17,8 +17,8 @@ from coop_drake.planning.sampling.collision import (
     segment_is_free,
     team_clearance,
 )
+from coop_drake.tree.arrays import FloatArray, IntArray
 from coop_drake.tree.component_tree import TeamArrays, place_component
-from coop_drake.tree.pose import FloatArray, IntArray
 
 # Nodes of a random tree, and a grid that finds the one nearest to a configuration; compiled.
 

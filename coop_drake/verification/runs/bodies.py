@@ -21,8 +21,8 @@ from shapely.geometry.base import BaseGeometry
 
 from coop_drake.answers.problem import PlanningProblem
 from coop_drake.progress import Progress
-from coop_drake.tree.component_tree import ComponentTree, TreeJoint
-from coop_drake.tree.pose import FloatArray, PlanarPose
+from coop_drake.tree.arrays import FloatArray
+from coop_drake.tree.component_tree import ComponentTree, PlanarPose, TreeJoint
 from coop_drake.verification.checks import Check
 from coop_drake.verification.runs.rows import Between, BodyMass, Rows, RunSetup
 

@@ -18,7 +18,7 @@ import shapely
 
 from coop_drake.answers.plan import Plan
 from coop_drake.errors import RefusalError
-from coop_drake.tree.pose import FloatArray, IntArray
+from coop_drake.tree.arrays import FloatArray, IntArray
 from coop_drake.verification.checks import Check
 from coop_drake.verification.runs.laws import signed_distances
 from coop_drake.verification.runs.rows import Rows

@@ -14,7 +14,7 @@ from coop_drake.answers.plan import Plan
 from coop_drake.answers.problem import PlanningProblem
 from coop_drake.errors import RefusalError
 from coop_drake.laws.ppc import FunnelShape
-from coop_drake.tree.pose import FloatArray
+from coop_drake.tree.arrays import FloatArray
 from coop_drake.verification.checks import Check
 from coop_drake.verification.runs.rows import Between, Rows
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from coop_drake.answers.log import SimulationLog
 from coop_drake.answers.plan import Plan
 from coop_drake.errors import RefusalError
-from coop_drake.tree.pose import FloatArray, IntArray
+from coop_drake.tree.arrays import FloatArray, IntArray
 from coop_drake.verification.checks import Check
 
 # What a run's log cannot state itself: its scenario's settings, and the masses of the bodies.

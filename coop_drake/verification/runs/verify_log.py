@@ -29,7 +29,7 @@ from coop_drake.answers.plan import Plan, plan_digest
 from coop_drake.answers.problem import PlanningProblem
 from coop_drake.errors import RefusalError
 from coop_drake.progress import Progress
-from coop_drake.tree.pose import FloatArray
+from coop_drake.tree.arrays import FloatArray
 from coop_drake.verification.checks import Check, Verified
 from coop_drake.verification.runs import bodies
 from coop_drake.verification.runs.budget import check_budget_used, check_nominal_reports
