@@ -58,13 +58,14 @@ from coop_drake.robustness.efforts import (
     transition_efforts,
 )
 from coop_drake.robustness.funnel_law import LAW
-from coop_drake.robustness.leaving import first_leaving, next_entry
 from coop_drake.robustness.nominal_axes import (
     AxisConditions,
     AxisSets,
     Entry,
     axis_sets,
     comes_near_limit,
+    first_leaving,
+    next_entry,
 )
 from coop_drake.robustness.position import PositionGains, position_bounds, position_may_rest
 from coop_drake.tree import ComponentTree

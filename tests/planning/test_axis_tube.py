@@ -10,7 +10,6 @@ from coop_drake.laws.axis_table import FADING_TIME, axis_table, bounds_of, track
 from coop_drake.laws.nominal import carry_axes
 from coop_drake.laws.ppc import fading
 from coop_drake.robustness.funnel_law import MEMORY, fit_law
-from coop_drake.robustness.leaving import _switching
 from coop_drake.robustness.nominal_axes import (
     ACCELERATION,
     COLUMNS,
@@ -21,6 +20,7 @@ from coop_drake.robustness.nominal_axes import (
     Entry,
     V,
     X,
+    _switching,
     axis_sets,
 )
 
@@ -111,7 +111,7 @@ def test_a_tube_is_left_from_each_rest_on_for_the_time_for_which_a_report_of_it_
     ]
     left = sorted({k for first in at_rest for k in range(first, min(first + since + 1, 40))})
     pushed = sorted({i for k in left for i in range(max(k - since, leaving), k + 1)})
-    low, high, slow, fast, now, since_report = _switching(tube, middle, (reach, rate), (since, leaving))
+    low, high, slow, fast, now, since_report = _switching(tube, middle, (reach, rate), since, leaving)
     if not left:
         assert low > high
         return

@@ -41,13 +41,14 @@ from coop_drake.robustness.efforts import (
     nothing_commanded,
     transition_efforts,
 )
-from coop_drake.robustness.leaving import first_leaving, next_entry
 from coop_drake.robustness.nominal_axes import (
     AxisConditions,
     AxisSets,
     Entry,
     axis_sets,
     comes_near_limit,
+    first_leaving,
+    next_entry,
 )
 from coop_drake.tree.arrays import FloatArray
 
