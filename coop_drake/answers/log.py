@@ -45,7 +45,7 @@ class SimulationLog:
     This is the table of columns: of their names, units, shapes and meanings. N robots, n joints of the whole
     team in the plan's order; the 1 + n axes of funnels and slices are (theta, q...). Planar quantities are
     ordered (x, y, rotation) in W. Margins are positive where the invariant holds. Where a column comes from,
-    ``simulation/telemetry.py`` says, and ``simulation/invariants.py`` of the margins.
+    ``simulation/telemetry.py`` says, also of the margins.
     """
 
     times: FloatArray = field(metadata=_row("s"))

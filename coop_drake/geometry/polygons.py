@@ -20,7 +20,7 @@ from coop_drake.errors import GeometryError
 from coop_drake.jit import compiled
 from coop_drake.tree.arrays import FloatArray
 
-# The polygons among the parts of a shape, and the corners of their rings.
+# Distances and crossings of points, segments and convex rings.
 
 
 @compiled
@@ -144,6 +144,9 @@ def separated(first: FloatArray, second: FloatArray, gap: float = 0.0) -> bool:
                 return True
         first, second = second, first
     return False
+
+
+# The polygons among the parts of a shape, and the corners of their rings.
 
 
 def parts_of(shape: BaseGeometry) -> list[Polygon]:

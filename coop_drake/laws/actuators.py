@@ -142,7 +142,7 @@ def braking_effort(state: FloatArray, brake: Brake, rest: FloatArray | None = No
 # the cell's law takes over: its funnels are closed about the axes, and p_G goes to the target.
 #
 # A cell is convex in its axes: from a rest inside the slices the way lies inside. What the plan states
-# about such rests is in ``answers/restart.py``.
+# about such rests is in ``answers/budget.py``.
 
 RATE = 0.4
 """Largest rate of an axis on the way, and largest speed of the object [rad/s or m/s]: a fifth to a tenth of

@@ -324,7 +324,7 @@ def best_loop(budget: Budget, disturbance: tuple[float, ...] = (), weight: float
     return best
 
 
-# How far axes depart where a team begins a cell anew from rest, see ``answers/restart.py``. On the slow way
+# How far axes depart where a team begins a cell anew from rest, see ``answers/budget.py``. On the slow way
 # of ``laws/actuators.py`` every axis has at most a rate and an acceleration that are the same in all cells.
 # The departures follow as in a transition, from a rest with constant errors: before it and at all samples
 # that are still to be used, what was measured is where the nominal motion is. An axis that is taken for

@@ -414,6 +414,9 @@ def squeezed(
     return True, cuts[:total], count
 
 
+# The cells of slices.
+
+
 class CellMaker:
     """Makes the cells of slices; positions of a component are cached by the intervals that move it.
 
