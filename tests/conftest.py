@@ -15,6 +15,9 @@ settings.register_profile(
 )
 settings.load_profile("reproducible")
 
+# What is collected lives as long as the session.
+gc.disable()
+
 
 @pytest.fixture(scope="session", autouse=True)
 def own_map_cache(tmp_path_factory):
@@ -23,6 +26,6 @@ def own_map_cache(tmp_path_factory):
 
 
 def pytest_collection_finish():
-    """Keep the garbage collector from what was collected: it lives as long as the session."""
-    gc.collect()
+    """Let the garbage collector look only at what comes from now on."""
     gc.freeze()
+    gc.enable()

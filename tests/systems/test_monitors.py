@@ -82,8 +82,6 @@ def test_bad_parameters_are_refused(cells):
     laws, goal = axis_laws(PLAN, AXES), np.zeros(2)
     with pytest.raises(ValueError, match="one inradius for each cell, not 3, 3 and 2"):
         ReadyMonitor(cells, laws, [0.1, 0.1], goal, 0.01)
-    with pytest.raises(ValueError, match="one inradius for each cell, not 0, 0 and 0"):
-        ReadyMonitor([], [], [], goal, 0.01)
     with pytest.raises(ValueError, match=r"position tolerance must be positive, not 0\.0"):
         ReadyMonitor(cells, laws, [0.1, 0.1, 0.1], goal, 0.0)
 
@@ -156,10 +154,6 @@ def test_it_has_not_measured_enough_at_first_and_compares_means_in_the_last_cell
 
 def evaluate_now(arrivals, context):
     return float(arrivals.GetOutputPort("arrival").Eval(context)[0])
-
-
-def test_before_the_last_cell_nothing_has_arrived(arrivals):
-    assert evaluate(arrivals, {**ARRIVING, "current_cell": [0.0, 0.0]}, "arrival").tolist() == [FAR]
 
 
 ARRIVING = {
