@@ -1,5 +1,6 @@
-"""Diagnoses of questions whose answer is known exactly."""
+"""Why there is no plan: passages, contacts, and the command that says so."""
 
+import json
 from dataclasses import replace
 
 import numpy as np
@@ -7,15 +8,18 @@ import pytest
 from shapely import box, union_all
 
 from coop_drake.answers import PlannerSettings, PlanningProblem
+from coop_drake.cli.results import ResultFolder
 from coop_drake.diagnosis import Answer, diagnose, diagnosing, diagnosis_figure, facts_of, sentences_of
 from coop_drake.diagnosis import diagnosing as relaxations
-from coop_drake.diagnosis.contacts import colliding_stretches
+from coop_drake.diagnosis.contacts import colliding_stretches, contacts, deepest, narrowest_gap, overlaps
 from coop_drake.diagnosis.diagnosing import SLICES, changes, find_passages, try_changes
 from coop_drake.diagnosis.variants import BudgetedPlanner, WidenedFloor, on_open_floor
 from coop_drake.drawing import save_figure
 from coop_drake.planning import Channel, find_channel
 from coop_drake.tree.component_tree import Body, Component, ComponentTree, PlanarPose, TreeJoint
-from tests.support.cases import case, rectangle
+from tests.support.cases import case, disc, rectangle, team_tree
+from tests.support.cli import invoke
+from tests.support.scenarios import write_scenario
 
 ROD = 0.2
 CORRIDOR = 0.15
@@ -190,3 +194,122 @@ def test_an_interrupt_comes_through():
 
     with pytest.raises(KeyboardInterrupt):
         diagnose(two_rooms(CORRIDOR, rod_tree()), stop)
+
+
+# Which bodies leave the floor, where, by how much; which walls face each other.
+
+
+ROOM = box(0.0, 0.0, 4.0, 1.0)
+
+
+def lone(shape) -> ComponentTree:
+    return ComponentTree((Component("load", None, None, (Body("load", None, (shape,)),)),), frozenset())
+
+
+def test_a_body_too_tall_for_a_room_sticks_out_on_both_sides():
+    found = contacts(ROOM, lone(rectangle(-0.5, 0.5, -0.6, 0.6)), np.array([2.0, 0.45, 0.0]))
+    assert [contact.depth for contact in found] == pytest.approx([0.15, 0.05])
+    assert found[0].wall[1] == pytest.approx(0.0)
+    assert found[0].point[1] == pytest.approx(-0.15)
+    assert found[1].wall[1] == pytest.approx(1.0)
+
+
+def test_a_body_inside_sticks_out_nowhere():
+    assert contacts(ROOM, lone(disc(0.4)), np.array([2.0, 0.5, 0.3])) == []
+    assert deepest(ROOM, lone(disc(0.4)), np.array([2.0, 0.5, 0.3])) == 0.0
+
+
+def test_a_wall_corner_that_pierces_a_body_counts():
+    floor = box(0.0, 0.0, 4.0, 4.0).difference(box(2.0, 0.0, 4.0, 2.0))
+    # A square turned by 45 degrees whose side passes 0.1 m behind the corner (2, 2).
+    centre = np.array([2.0, 2.0]) + (0.5 - 0.1) * np.array([-1.0, 1.0]) / np.sqrt(2.0)
+    (found,) = contacts(floor, lone(rectangle(-0.5, 0.5, -0.5, 0.5)), np.array([*centre, np.pi / 4]))
+    assert found.depth == pytest.approx(0.1)
+    assert found.wall == pytest.approx([2.0, 2.0])
+
+
+def test_the_depth_of_an_overlap_is_the_way_out():
+    joint = TreeJoint("arm::slide", "prismatic", 0, 0, PlanarPose(), 1.0, (1.0, 0.0), 0.0, 3.0)
+    tree = ComponentTree(
+        (
+            Component("load", None, None, (Body("load", None, (rectangle(-0.5, 0.5, -0.5, 0.5),)),)),
+            Component("arm", 0, joint, (Body("arm", 0, (disc(0.2),)),)),
+        ),
+        frozenset(),
+    )
+    (found,) = overlaps(tree, np.array([0.0, 0.0, 0.0, 0.65]))
+    assert found.bodies == ("load", "arm")
+    assert found.depth == pytest.approx(0.05)
+    assert overlaps(tree, np.array([0.0, 0.0, 0.0, 0.71])) == []
+    assert overlaps(team_tree(), np.zeros(5)) == []
+
+
+def test_a_gap_joins_walls_that_face_each_other():
+    floor = box(0, 0, 2, 2).union(box(1.5, 0.8, 3.5, 1.2)).union(box(3, 0, 5, 2))
+    gap = narrowest_gap(floor, [np.array([2.4, 0.8])])
+    assert gap is not None
+    assert gap.width == pytest.approx(0.4)
+    assert gap.second == pytest.approx([2.4, 1.2])
+
+
+def test_a_corner_of_a_bend_faces_the_outer_walls():
+    bend = box(0, 0, 0.8, 3).union(box(0, 2, 3, 3))
+    gap = narrowest_gap(bend, [np.array([0.8, 2.0])])
+    assert gap is not None
+    assert gap.width == pytest.approx(0.8)
+    assert gap.second == pytest.approx([0.0, 2.0])
+
+
+# The command why: answers, exit codes, pictures, and no traceback for a user's mistake.
+
+
+def told_by(path, folder):
+    """Commands that report the same plan of a scenario."""
+    watch = ("watch", path, "--strategy", "portfolio", "--frames", 2, "--output", folder / "think")
+    return ("plan", path, "--out", folder / "plan"), ("why", path, "--out", folder / "why"), watch
+
+
+@pytest.fixture
+def blocked(tmp_path):
+    """A goal at which a hand just fits before the wall, but not the base behind it."""
+    goal = {"object": {"x": 5.2, "y": 2.0, "theta": 0.0}}
+    return write_scenario(tmp_path / "blocked.scenario.yaml", goal=goal)
+
+
+@pytest.mark.slow
+def test_a_blocked_goal_gets_its_sentences_pictures_and_exit_code_3_and_again(blocked, tmp_path):
+    out, answers = tmp_path / "out", []
+    for _ in range(2):
+        result = invoke("why", blocked, "--out", out, "--json")
+        assert result.exit_code == 3, result.stderr
+        facts = json.loads(result.stdout)
+        kept = {name: fact for name, fact in facts.items() if not name.endswith(("seconds", "_mb"))}
+        answers.append(kept)
+    assert answers[0] == answers[1]
+    assert facts["answer"] == "infeasible"
+    assert {contact["body"].split("::")[0] for contact in facts["goal"]["contacts"]} == {"robot_0"}
+    assert facts["goal"]["walls_moved_back_m"]["found_enough"] > 0.1
+    assert facts["diagnosis_cpu_seconds"] > 0.0
+    assert facts["sentences"][0] in " ".join(result.stderr.split())
+    assert sorted(path.name for path in out.iterdir()) == [".coop_drake_results.json", "why.png", "why.svg"]
+    assert (out / "why.svg").read_text().lstrip().startswith("<?xml")
+
+
+@pytest.mark.slow
+def test_a_feasible_scenario_is_said_to_be_so_and_an_older_picture_goes(tmp_path):
+    path, out = write_scenario(tmp_path / "room.scenario.yaml"), tmp_path / "out"
+    ResultFolder(out).begin("diagnosis")
+    (out / "why.png").write_bytes(b"of an older diagnosis")
+    result = invoke("why", path, "--out", out)
+    assert result.exit_code == 0, result.output
+    assert "Nothing blocks: there is a plan" in result.output
+    rows = [json.loads(invoke(*command, "--json").stdout) for command in told_by(path, tmp_path)]
+    for name in ("answer", "cells", "narrowest_neck_m", "estimated_seconds"):
+        assert len({facts[name] for facts in rows}) == 1, name
+    assert [path.name for path in out.iterdir()] == [".coop_drake_results.json"]
+
+
+def test_plan_points_to_why(blocked, tmp_path):
+    result = invoke("plan", blocked, "--out", tmp_path / "out")
+    assert result.exit_code == 3
+    assert f"coop-drake why {blocked}" in result.output.replace("\n", "")

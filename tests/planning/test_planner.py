@@ -1,4 +1,4 @@
-"""The planner: answers, efforts, bytes that do not change, and a whole transport."""
+"""From the question to an answer: plans of the planner, and its proofs."""
 
 import json
 import os
@@ -9,20 +9,32 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from shapely import box
+import shapely
+from shapely import Point, Polygon, affinity, box, union_all
 
-from coop_drake.answers import BeyondLimits, Found, Infeasible, SearchReport, Undecided
+from benchmarks.adversaries.questions import discs_in_a_corridor
+from benchmarks.planner.family import corridor_floor, corridor_problem, shelf_problem
+from coop_drake.answers import BeyondLimits, Found, Infeasible, PlanningProblem, SearchReport, Undecided
 from coop_drake.answers.plan import Refusal, check_plan, plan_document
 from coop_drake.errors import StallError
 from coop_drake.laws import ScheduledGains
-from coop_drake.planning import planner
+from coop_drake.planning import find_channel, planner
+from coop_drake.planning.cells.cells import Squeezes
+from coop_drake.planning.cells.exploration import Exploration, Verdict
 from coop_drake.planning.channel import CoveredPath, NoChannel
 from coop_drake.planning.duration import plan_time
 from coop_drake.planning.planner import plan, quicker_plans
+from coop_drake.planning.proofs import MANY_CORNERS, Proofs, blocked_goal, clearance_bound, refuted_at_an_end
+from coop_drake.planning.questions import relaxed
 from coop_drake.planning.rescaling import Rescaling
+from coop_drake.planning.sampling.sampler import DISC_SHRINKAGE, DISC_TOLERANCE, guiding_disc
 from coop_drake.planning.search import find_path
+from coop_drake.tree.component_tree import Body, Component, ComponentTree, ConvexShape, PlanarPose, TreeJoint
+from coop_drake.verification import verify_proof
 from tests.planning.test_search import rod_problem
+from tests.support.cases import case, rectangle, transport
 from tests.support.channels import bent_channel
+from tests.support.free_positions import FreePositions
 from tests.support.point_mass import build_fields, carry_out
 
 # The planner's three answers, with the search replaced by channels written by hand.
@@ -236,3 +248,194 @@ def test_the_transport_arrives_in_time_and_stays_in_its_cells(problem):
     assert transport.least_funnel_gap > 0.0
     assert np.hypot(*(transport.position - problem.goal_pose[:2])) <= problem.position_tolerance
     assert abs(transport.axes[0] - made.goal_pose[2]) <= problem.angle_tolerance
+
+
+# Proofs that no plan exists: of parts of a team, from the walls near an end, and of squeezed pairs.
+
+
+# Relaxations in turns: proofs where there are proofs, none of a feasible case, covers without a gap.
+
+
+@pytest.mark.slow
+def test_the_whole_of_a_team_is_refuted_along_the_few_axes_that_matter() -> None:
+    """Six dimensions, no relaxation: theta and the joint of the robot that is in the way come first."""
+    exploration = Exploration(transport(0.95, robots=3))
+    outcome = exploration.run(1000)
+    assert outcome.verdict is Verdict.INFEASIBLE
+    assert outcome.slices < 600
+
+
+def test_one_of_three_robots_is_refuted_in_a_corridor_near_its_critical_width() -> None:
+    question, _ = relaxed(corridor_problem(0.9895, 1.5, robots=3), (2,))
+    assert Exploration(question).run(1000).verdict is Verdict.INFEASIBLE
+
+
+def test_bodies_in_each_others_way_are_parted_along_their_own_axis() -> None:
+    block = Body("block", None, (rectangle(-0.1, 0.1, -0.3, 0.3),))
+    arm = Body("arm", 0, (rectangle(-0.3, 0.3, -0.05, 0.05),))
+    slide = TreeJoint("slide", "prismatic", 0, 0, PlanarPose(), 1.0, (1.0, 0.0), -1.0, 1.0)
+    tree = ComponentTree(
+        (Component("block", None, None, (block,)), Component("arm", 0, slide, (arm,))), frozenset()
+    )
+    start, goal = np.array([0.0, 0.0, 0.0, -0.6]), np.array([0.5, 0.0, 0.0])
+    problem = PlanningProblem(box(-3.0, -3.0, 3.0, 3.0), tree, start, goal, (0.6,))
+    assert Exploration(problem).run(200).verdict is Verdict.INFEASIBLE
+
+
+def test_a_relaxation_refutes_the_whole() -> None:
+    proofs = Proofs(transport(0.95, 1.5, 3, 1))
+    share = 64
+    while proofs.run(share) is Verdict.BUDGET:
+        share *= 2
+    assert proofs.refutation is not None
+    assert "the object with robots [2] alone" in proofs.refutation.reason
+    assert proofs.refutation.proof.kind == "slices"
+    assert proofs.slices < 600
+
+
+def test_runs_go_on_where_they_stopped() -> None:
+    problem = rod_problem(0.23)
+    alone, stepped = Proofs(problem), Proofs(problem)
+    assert alone.run(800) is Verdict.FOUND
+    for share in (10, 40, 800):
+        verdict = stepped.run(share)
+    assert verdict is Verdict.FOUND
+    assert [box.intervals for box in stepped.boxes()] == [box.intervals for box in alone.boxes()]
+
+
+def test_a_corridor_narrower_than_the_object_is_refuted_by_the_object_alone() -> None:
+    proofs = Proofs(transport(0.45))
+    assert proofs.run(40, 0) is Verdict.INFEASIBLE
+    assert proofs.refutation is not None
+    assert "the object alone" in proofs.refutation.reason
+
+
+@pytest.mark.parametrize("radius", [0.0, 0.1])
+@pytest.mark.parametrize(
+    ("corners", "inradius"),
+    [
+        ([(0, 0), (2, 0), (2, 1), (0, 1)], 0.5),
+        ([(0, 0), (3, 0), (0, 1)], 0.5 * (4.0 - np.sqrt(10.0))),
+        ([(1, 1)], 0.0),
+    ],
+)
+def test_guiding_discs_lie_inside_and_are_nearly_the_largest(corners, inradius, radius) -> None:
+    disc = guiding_disc(ConvexShape(np.array(corners, dtype=float), radius))
+    assert len(disc.vertices) == 1
+    if len(corners) < 3:
+        assert disc.radius == radius
+        return
+    ring, centre = Polygon(corners), Point(disc.vertices[0])
+    room = ring.exterior.distance(centre)
+    assert ring.contains(centre)
+    assert inradius - DISC_TOLERANCE * ring.length <= room <= inradius + 1e-12
+    assert disc.radius == pytest.approx(DISC_SHRINKAGE * room + radius, rel=1e-12)
+
+
+def test_a_goal_in_collision_is_stated() -> None:
+    problem = case("base")
+    blocked = replace(problem, goal_pose=np.array([6.2, 4.5, 0.0]))
+    proof, slices = blocked_goal(blocked)
+    assert proof is not None
+    assert proof.kind == "blocked goal"
+    assert slices <= 128
+    verify_proof(proof, blocked)
+    assert blocked_goal(problem)[0] is None
+
+
+@pytest.mark.parametrize(("corridor", "bound"), [(0.21, 0.01), (0.3, 0.08), (1.0, None)])
+def test_the_room_of_a_way_is_bounded(corridor: float, bound: float | None) -> None:
+    assert clearance_bound(rod_problem(corridor))[0] == bound
+
+
+# On large floors the walls near the goal or start prove that no plan exists; the exact checker agrees.
+
+
+def behind_a_corridor(width: float) -> PlanningProblem:
+    """Shelves, and the goal in a room behind a corridor of some width [m], with a bend."""
+    shelves = shelf_problem(MANY_CORNERS + 20)
+    *_, x, y = shelves.workspace.bounds
+    off = np.array([x - 6.0, y - 1.0, 0.0])
+    floor = union_all([shelves.workspace, affinity.translate(corridor_floor(width, 1.2), *off[:2])])
+    return replace(shelves, workspace=floor.simplify(0.0), goal_pose=corridor_problem().goal_pose + off)
+
+
+@pytest.mark.slow
+@pytest.mark.no_cover
+def test_a_bend_that_is_too_narrow_is_proved_from_the_walls_near_it() -> None:
+    question = behind_a_corridor(0.76)
+    result = plan(question, ScheduledGains(), gain_set_name="scheduled")
+    assert isinstance(result, Infeasible)
+    assert result.proof is not None
+    cells = [cell.polygon for part in result.proof.slices for cell in part.cells]
+    most = max(int(shapely.get_num_coordinates(cell)) for cell in cells)
+    assert most < MANY_CORNERS / 2  # shelves far away are not in the certificate
+    verify_proof(result.proof, question)  # raises an error where it refuses
+
+
+def test_a_start_that_cannot_be_left_is_proved_without_the_goal() -> None:
+    question = shelf_problem(MANY_CORNERS + 20)
+    x, y = question.start[:2]
+    fence = box(x - 3.0, y - 3.0, x + 2.6, y + 3.0).difference(box(x - 3.0, y - 3.0, x + 2.4, y + 2.8))
+    gap = box(x - 0.2, y, x + 0.2, y + 4.0)
+    fenced = replace(question, workspace=question.workspace.difference(fence.difference(gap)))
+    refutation, _ = refuted_at_an_end(fenced)
+    assert refutation is not None
+    verify_proof(refutation.proof, fenced)
+
+
+def test_nothing_is_proved_where_the_team_can_go_or_the_floor_is_small() -> None:
+    refutation, slices = refuted_at_an_end(shelf_problem(MANY_CORNERS + 20))
+    assert refutation is None
+    assert slices > 0
+    assert refuted_at_an_end(corridor_problem(0.7)) == (None, 0)
+
+
+# Two round pieces that walls squeeze together: positions so forbidden hold no free configuration.
+
+
+class Recorded(Squeezes):
+    """Keeps every squeezed pair that is found, with its slice."""
+
+    def __init__(self, *given):
+        super().__init__(*given)
+        self.found = []
+
+    def find(self, intervals, corners, growth):
+        pair = super().find(intervals, corners, growth)
+        self.found += [(intervals, pair)] if pair is not None else []
+        return pair
+
+
+def two_bases(width):
+    """Robots 0 and 2 in a corridor with a bend; the base of robot 2 stays on the side of robot 0."""
+    question, _ = relaxed(corridor_problem(width, 1.5, robots=3), (0, 2))
+    *others, last = question.tree.components
+    last = replace(last, joint=replace(last.joint, lower=0.5))
+    start = np.array([*question.start[:4], 1.0])
+    return replace(question, tree=ComponentTree((*others, last), question.tree.unchecked_pairs), start=start)
+
+
+@pytest.mark.slow
+def test_walls_that_squeeze_two_bases_together_close_a_corridor_with_few_slices(monkeypatch):
+    monkeypatch.setattr("coop_drake.planning.cells.cells.Squeezes", Recorded)
+    question = two_bases(0.99)
+    exploration = Exploration(question)
+    assert exploration.run(1000).verdict is Verdict.INFEASIBLE
+    found, random = exploration.maker._squeezes.found, np.random.default_rng(0)
+    assert len(found) > 10
+    for intervals, pair in found:
+        positions = random.dirichlet(np.full(len(pair.polygon), 0.5), 100) @ pair.polygon
+        for share in random.random((5, len(intervals))):
+            angles = [low + part * (high - low) for part, (low, high) in zip(share, intervals, strict=True)]
+            assert not FreePositions(question.tree, question.workspace, angles).free(positions).any()
+
+
+@pytest.mark.slow
+def test_a_proof_with_squeezed_pairs_is_written_down_and_holds():
+    problem = discs_in_a_corridor(1.195)
+    answer, _ = find_channel(problem)
+    assert answer.proved
+    assert sum(len(part.squeezes) for part in answer.proof.slices) > 0
+    checked = {check.name: check.count for check in verify_proof(answer.proof, problem).checks}
+    assert checked["pieces are squeezed in all of a slice"] > 0

@@ -1,4 +1,4 @@
-"""Every block: its table of ports and its state, and which arguments are refused."""
+"""Blocks: ports, state and arguments of each, and those next to the plant."""
 
 import inspect
 import re
@@ -6,11 +6,24 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from pydrake.systems.framework import Diagram, LeafSystem
+from hypothesis import given
+from hypothesis import strategies as st
+from pydrake.systems.analysis import Simulator
+from pydrake.systems.framework import Diagram, DiagramBuilder, LeafSystem
+from pydrake.systems.primitives import FirstOrderLowPassFilter, ZeroOrderHold
 
 from benchmarks.one_process import DirectExchange
 from coop_drake import systems
 from coop_drake.diagram import build_closed_loop, build_world
+from coop_drake.laws import acceleration_at, wrench_share
+from coop_drake.laws.departures import CREEP_SPEED, act_on_wrenches, without_departures
+from coop_drake.plant import (
+    base_poses,
+    build_robot_plant,
+    build_separate_team,
+    build_team_plant,
+    set_configuration,
+)
 from coop_drake.scenario import (
     ActuatorLimits,
     BlockedWheels,
@@ -28,8 +41,10 @@ from coop_drake.scenario import (
     WheelSlip,
 )
 from coop_drake.simulation import build_maps
+from tests.support.robot_matrices import turned
 from tests.support.small_loop import small_maps, small_problem
-from tests.support.system_checks import SIZE_OF_ABSTRACT, port_sizes, state_of
+from tests.support.small_scenario import small_scenario
+from tests.support.system_checks import SIZE_OF_ABSTRACT, evaluate, port_sizes, state_of
 from tests.support.tubes import WITH_AXES, tubed_problem
 
 ROW = re.compile(r"^ *(input|output) +``(\S+)`` +(\S(?:.*?\S)?)(?:  |$)", re.MULTILINE)
@@ -193,3 +208,232 @@ REFUSED = [
 def test_wrong_arguments_are_refused(block, arguments, more, complaint):
     with pytest.raises(ValueError, match=complaint):
         block(*arguments, **more)
+
+
+# Blocks next to the plant: sensors, efforts, actuators, friction and the load's wrench.
+
+
+TEAMS = ("base", "elbow", "three")
+
+
+class Rig:
+    """A shipped team in a configuration where nothing is symmetric, moving."""
+
+    def __init__(self, team):
+        self.scenario = small_scenario(team)
+        self.team = build_team_plant(self.scenario, DiagramBuilder())
+        generator = np.random.default_rng(3)
+        n = len(self.team.joints)
+        self.z = np.array([3.0, 3.0, 0.4, *generator.uniform(-0.8, 0.8, n)])
+        self.rates = generator.uniform(-0.5, 0.5, 3 + n)
+        self.context = self.team.plant.CreateDefaultContext()
+        set_configuration(self.team, self.context, self.z, self.rates)
+        self.team_state = self.team.plant.GetPositionsAndVelocities(self.context)
+
+    def measured(self):
+        """The object's pose, then every robot's state."""
+        sensor = systems.TeamSensor(self.team)
+        values = evaluate(sensor, {"team_state": self.team_state}, "measurements")
+        return np.split(values, np.cumsum(sensor.sizes)[:-1])
+
+    def robot_state(self, k):
+        return self.measured()[1 + k]
+
+    def grasp(self, k):
+        X_LE = self.team.robots[k].X_LE
+        return np.array([X_LE.x, X_LE.y])
+
+
+@pytest.fixture(scope="module", params=TEAMS)
+def rig(request):
+    return Rig(request.param)
+
+
+def test_the_team_sensor_reads_the_object_and_every_robots_base_and_joints(rig):
+    sensor, states = systems.TeamSensor(rig.team), rig.team.plant.num_multibody_states()
+    sizes = [3, *(2 * (3 + len(robot.joints)) for robot in rig.team.robots)]
+    assert sensor.sizes == sizes
+    assert port_sizes(sensor) == ({"team_state": states}, {"measurements": sum(sizes)})
+    pose, *robots = rig.measured()
+    np.testing.assert_array_equal(pose, rig.z[:3])
+    ahead, step = rig.team.plant.CreateDefaultContext(), 1e-6
+    set_configuration(rig.team, ahead, rig.z + step * rig.rates)
+    behind = rig.team.plant.CreateDefaultContext()
+    set_configuration(rig.team, behind, rig.z - step * rig.rates)
+    base_rates = (base_poses(rig.team, ahead) - base_poses(rig.team, behind)) / (2.0 * step)
+    for robot, state in zip(rig.team.robots, robots, strict=True):
+        n = len(robot.joints)
+        np.testing.assert_allclose(state[:3], base_poses(rig.team, rig.context)[robot.index], atol=1e-14)
+        np.testing.assert_array_equal(state[3 : 3 + n], rig.z[3:][robot.q_slice])
+        np.testing.assert_allclose(state[3 + n : 6 + n], base_rates[robot.index], atol=1e-8)
+        np.testing.assert_array_equal(state[6 + n :], rig.rates[3:][robot.q_slice])
+
+
+def test_every_robot_finds_the_objects_state_from_its_own_motion(rig):
+    for robot in rig.team.robots:
+        k, n = robot.index, len(robot.joints)
+        system = systems.ObjectEstimator(build_robot_plant(rig.scenario, k), rig.grasp(k))
+        assert port_sizes(system) == ({"robot_state": 2 * (3 + n), "object_pose": 3}, {"object_state": 6})
+        inputs = {"robot_state": rig.robot_state(k), "object_pose": rig.z[:3]}
+        known = evaluate(system, inputs, "object_state")
+        np.testing.assert_array_equal(known[:3], rig.z[:3])
+        np.testing.assert_allclose(known[3:], rig.rates[:3], atol=1e-13)
+
+
+@pytest.fixture(scope="module", params=["base", "elbow"])
+def teams(request):
+    """The same team in both plants, in the same configuration, and each plant's state."""
+    scenario = small_scenario(request.param)
+    built = [build(scenario, DiagramBuilder()) for build in (build_separate_team, build_team_plant)]
+    rng = np.random.default_rng(3)
+    z, rates = rng.uniform(-0.7, 0.7, (2, 3 + len(built[0].joints)))
+    states = []
+    for team in built:
+        context = team.plant.CreateDefaultContext()
+        set_configuration(team, context, z, rates)
+        states.append(team.plant.GetPositionsAndVelocities(context))
+    return list(zip(built, states, strict=True))
+
+
+def test_the_same_is_measured_in_both_plants(teams):
+    (separate, state), (tree, tree_state) = teams
+    sensor, of_tree = systems.build_separate_sensor(separate), systems.TeamSensor(tree)
+    values = evaluate(of_tree, {"team_state": tree_state}, "measurements")
+    expected = np.split(values, np.cumsum(of_tree.sizes)[:-1])
+    names = ["object_pose", *(f"robot_{robot.index}_state" for robot in separate.robots)]
+    assert port_sizes(sensor) == (
+        {"team_state": separate.plant.num_multibody_states()},
+        dict(zip(names, of_tree.sizes, strict=True)),
+    )
+    for name, value in zip(names, expected, strict=True):
+        np.testing.assert_allclose(evaluate(sensor, {"team_state": state}, name), value, atol=1e-12)
+
+
+LAG, PERIOD = 0.03, 0.02
+
+
+class Wanted(LeafSystem):
+    """Asks for efforts that change all the time."""
+
+    def __init__(self):
+        super().__init__()
+        self.DeclareVectorOutputPort("wanted", 2, self._write)
+
+    def _write(self, context, output):
+        output.SetFromVector([3.0 + context.get_time(), np.sin(40.0 * context.get_time())])
+
+
+def simulated(offset):
+    """Efforts of the block and of Drake's filter, integrated in short steps, at some times."""
+    builder = DiagramBuilder()
+    hold = builder.AddSystem(ZeroOrderHold(PERIOD, 2, offset))
+    builder.Connect(builder.AddSystem(Wanted()).get_output_port(), hold.get_input_port())
+    blocks = [
+        builder.AddSystem(block)
+        for block in (systems.LaggingEffort(2, LAG, PERIOD, offset), FirstOrderLowPassFilter(LAG, 2))
+    ]
+    for block in blocks:
+        builder.Connect(hold.get_output_port(), block.get_input_port())
+    simulator = Simulator(builder.Build())
+    simulator.get_mutable_integrator().set_target_accuracy(1e-9)
+    given = []
+    for time in (0.0, 0.005, 0.02, 0.033, 0.1, 0.1101, 0.2):
+        simulator.AdvanceTo(time)
+        root = simulator.get_context()
+        given.append([block.get_output_port().Eval(block.GetMyContextFromRoot(root)) for block in blocks])
+    return np.array(given).transpose(1, 0, 2)
+
+
+@pytest.mark.parametrize("offset", [0.0, 0.007])
+def test_efforts_are_those_of_a_low_pass_behind_a_hold(offset):
+    own, drakes = simulated(offset)
+    np.testing.assert_array_equal(own[0], 0.0)
+    np.testing.assert_allclose(own, drakes, rtol=1e-6, atol=1e-9)
+    assert own[-1, 0] > 2.9
+
+
+@pytest.mark.parametrize(
+    ("asked", "given"),
+    [
+        ([6.0, -8.0, 0.0, 0.0], [3.0, -4.0, 0.0, 0.0]),
+        ([2.0, -np.inf, 0.0, np.inf], [0.0, -5.0, 0.0, 0.5]),
+        ([4.0, 3.0, 0.0, 0.0], [4.0, 3.0, 0.0, 0.0]),
+        ([0.0, 1.0, -3.0, 0.7], [0.0, 1.0, -2.0, 0.5]),
+    ],
+)
+def test_a_force_is_limited_by_its_length_and_torques_and_joints_one_by_one(asked, given):
+    limited = evaluate(systems.LimitedEffort(np.array([5.0, 2.0, 0.5])), {"asked": asked}, "given")
+    np.testing.assert_allclose(limited, given, rtol=1e-14)
+
+
+SPEEDS = st.floats(-3.0, 3.0)
+
+
+def base_friction(vx, vy, coulomb, viscous):
+    """What the floor does to one base, and no torque."""
+    world, wrenches = (
+        without_departures(1)._replace(floor=np.array([coulomb, viscous, 0.0])),
+        np.zeros((1, 3)),
+    )
+    act_on_wrenches(world, 0.0, 0.0, np.array([[vx, vy]]), wrenches)
+    assert wrenches[0, 2] == 0.0
+    return wrenches[0, :2]
+
+
+@given(SPEEDS, SPEEDS, st.floats(0.0, 100.0), st.floats(0.0, 100.0))
+def test_friction_opposes_motion_and_is_no_stronger_than_stated(vx, vy, coulomb, viscous):
+    force, speed = base_friction(vx, vy, coulomb, viscous), np.hypot(vx, vy)
+    assert force @ [vx, vy] <= 0.0
+    assert force[0] * vy == pytest.approx(force[1] * vx, abs=1e-9)
+    assert np.hypot(*force) <= (coulomb + viscous * speed) * (1.0 + 1e-12)
+    if speed > 10.0 * CREEP_SPEED:
+        assert np.hypot(*force) >= 0.99 * (coulomb + viscous * speed)
+
+
+def test_wheels_that_slip_lose_their_share_for_their_time():
+    block = systems.WheelSlips(np.array([[1.0, np.inf], [2.0, np.inf], [0.3, 0.0]]))
+    driven = np.arange(1.0, 7.0)
+    for time, left in ((0.9, 1.0), (1.0, 0.7), (1.9, 0.7), (2.0, 1.0)):
+        passed = evaluate(block, {"driven": driven}, "passed", time)
+        np.testing.assert_allclose(passed, driven * [left, left, left, 1.0, 1.0, 1.0], rtol=1e-15)
+
+
+def test_pushes_add_up_on_what_they_push_while_they_last():
+    block = systems.Pushes(1, np.array([[0, 5.0, -1.0, 0.2, 1.0, 2.0], [1, 0.0, 3.0, 0.4, 1.5, 3.0],
+                                        [1, 1.0, 1.0, 0.0, 1.5, 2.0]]))  # fmt: skip
+    assert port_sizes(block) == ({"asked": 3}, {"pushed": 6})
+    for time, own, on_object in (
+        (0.9, [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]), (1.0, [5.0, -1.0, 0.2], [0.0, 0.0, 0.0]),
+        (1.5, [5.0, -1.0, 0.2], [1.0, 4.0, 0.4]), (2.0, [0.0, 0.0, 0.0], [0.0, 3.0, 0.4]),
+        (3.0, [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]),
+    ):  # fmt: skip
+        pushed = evaluate(block, {"asked": [7.0, 8.0, 9.0]}, "pushed", time)
+        np.testing.assert_allclose(pushed, [*np.add([7.0, 8.0, 9.0], own), *on_object], rtol=1e-15)
+
+
+def test_every_base_has_its_own():
+    block = systems.FloorFriction([1, 0], 30.0, 2.0)
+    assert port_sizes(block) == ({"robot_0_state": 8, "robot_1_state": 6}, {"friction_wrenches": 6})
+    inputs = {
+        "robot_0_state": [1.0, 2.0, 3.0, 4.0, 0.3, 0.4, 5.0, 6.0],
+        "robot_1_state": [1.0, 2.0, 3.0, 0.0, -1.0, 4.0],
+    }
+    expected = [*base_friction(0.3, 0.4, 30.0, 2.0), 0.0, *base_friction(0.0, -1.0, 30.0, 2.0), 0.0]
+    np.testing.assert_array_equal(evaluate(block, inputs, "friction_wrenches"), expected)
+
+
+def test_the_hand_s_command_is_the_law():
+    """Acceleration of the grasp and the robot's share of the wrench, from what governor and axes command."""
+    p_LE, p_LLcm, wanted = np.array([0.4, 0.1]), np.array([0.05, -0.02]), np.array([1.2, -0.4, 2.0])
+    law = systems.WrenchLaw(p_LE, p_LLcm=p_LLcm, mass=3.0, inertia=0.7, share=0.25, joints=2)
+    inputs = {
+        "object_state": [3.8, 3.5, 0.7, 0.3, 0.1, 0.9],
+        "governor_command": [7.0, 8.0, 1.2, -0.4],
+        "axis_acceleration": [2.0, 9.0, 10.0],
+    }
+    np.testing.assert_array_equal(evaluate(law, inputs, "object_acceleration"), wanted)
+    r, com = turned(0.7, p_LE), turned(0.7, p_LLcm)
+    grasp, share = np.split(evaluate(law, inputs, "hand_command"), 2)
+    np.testing.assert_allclose(grasp, [*acceleration_at(*r, *wanted, 0.9), 2.0], rtol=1e-14)
+    of_com = acceleration_at(*com, *wanted, 0.9)
+    np.testing.assert_allclose(share, wrench_share(*(com - r), *of_com, 2.0, 3.0, 0.7, 0.25), rtol=1e-14)
