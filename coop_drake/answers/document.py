@@ -82,6 +82,9 @@ Region = Annotated[Polygon, Codec(Rings, _read_region, _write_region)]
 
 # Digests: which question a file answers, and whether its content is still what was written.
 
+MOTION_LIMITS = ("base_accelerations", "turn_accelerations", "base_jerks", "object_acceleration")
+"""Limits that are part of a question where they are stated."""
+
 DECIMALS = 9
 """Decimals of a problem's numbers that its digest sees [m, rad]: last bits differ between libraries."""
 
@@ -126,10 +129,13 @@ def _limits(limits: TeamLimits) -> dict[str, Any]:
     stated, document = to_plain(limits, TeamLimits), {}
     accelerations = stated.pop("joint_accelerations")
     del stated["joint_efforts"]
+    of_motions = {name: stated.pop(name) for name in MOTION_LIMITS}
     if limits.any:
         document["limits"] = _rounded(list(stated.values()))
     if np.isfinite(limits.joint_accelerations).any():
         document["accelerations"] = _rounded(accelerations)
+    if any(np.isfinite(getattr(limits, name)).any() for name in MOTION_LIMITS):
+        document["motion"] = _rounded(list(of_motions.values()))
     return document
 
 

@@ -22,6 +22,7 @@ from coop_drake.answers.document import (
     problem_digest,
     write_document,
 )
+from coop_drake.answers.motion import Motion
 from coop_drake.answers.problem import PlanningProblem
 from coop_drake.answers.proof import InfeasibilityProof
 from coop_drake.errors import PlanError
@@ -222,6 +223,8 @@ class Plan:
             carried out. Empty for a plan that can.
         restart: From which rests a cell can be begun anew under the budget; null in a plan without one for
             angles and joints.
+        motion: The nominal motion of a team that passes from cell to cell without a stop; null for one that
+            comes to rest in every cell.
     """
 
     problem: str = ""
@@ -240,6 +243,7 @@ class Plan:
     alarms: Alarms | None = None
     refused_by: tuple[Refusal, ...] = ()
     restart: Restart | None = None
+    motion: Motion | None = None
 
     def governed(self, index: int) -> Polygon:
         """Return the region to which the governor keeps p_G in a cell: Q_i, or less where there is a tube."""
@@ -414,6 +418,10 @@ def read_plan(document: Document) -> Plan:
                     document.check_length(f"transitions[{k}].{part}.{name}", axes)
         if parts["tolerance"] is not None:
             _check_levels(document, f"transitions[{k}].tolerance", axes)
+    if plan.motion is not None:
+        document.check_length("motion.points[0]", 2 + axes)
+        document.check_length("motion.windows", len(plan.cells))
+        document.check_length("motion.rates", len(plan.cells))
     return plan
 
 

@@ -27,6 +27,11 @@ class TeamLimits:
         joint_rates: Largest rate of every joint, shape (n,) [rad/s or m/s].
         joint_accelerations: Largest acceleration of every joint, shape (n,) [rad/s^2 or m/s^2].
         joint_efforts: Largest effort of every joint's motor, shape (n,) [N m or N].
+        base_accelerations: Largest acceleration of the bases' origins, shape (N,) [m/s^2]; this and what
+            follows is kept by motions that pass from cell to cell.
+        turn_accelerations: Largest acceleration of the bases' angles, shape (N,) [rad/s^2].
+        base_jerks: Largest jerk of the bases' origins, shape (N,) [m/s^3].
+        object_acceleration: Largest acceleration of the object's origin, of shape (1,) [m/s^2].
     """
 
     base_components: tuple[int, ...] = ()
@@ -36,6 +41,10 @@ class TeamLimits:
     joint_rates: Bounds = field(default_factory=_none)
     joint_accelerations: Bounds = field(default_factory=_none)
     joint_efforts: Bounds = field(default_factory=_none)
+    base_accelerations: Bounds = field(default_factory=_none)
+    turn_accelerations: Bounds = field(default_factory=_none)
+    base_jerks: Bounds = field(default_factory=_none)
+    object_acceleration: Bounds = field(default_factory=_none)
 
     @property
     def any(self) -> bool:
@@ -72,6 +81,8 @@ class PlannerSettings:
             default. It counts samples and moves, not seconds.
         strategy: ``portfolio`` samples, certifies and proves; ``cells`` explores by cells alone, and
             ``paper`` as the paper's algorithms are printed, both at margin zero.
+        hand_over: ``rest``: the team rests in every cell before it enters the next one, as the paper's does;
+            ``pass``: it passes without a stop, at a pace from which it can stop, within ``limits``.
     """
 
     margin: NotNegative = 0.1
@@ -83,6 +94,7 @@ class PlannerSettings:
     max_transition_time: Positive = 60.0
     effort: Annotated[float, Limits(at_least=0.0, at_most=1000.0)] = 1.0
     strategy: Literal["portfolio", "cells", "paper"] = "portfolio"
+    hand_over: Literal["rest", "pass"] = "rest"
 
 
 @dataclass(frozen=True, eq=False)

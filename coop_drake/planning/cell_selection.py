@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from itertools import pairwise
-from math import ceil
+from math import ceil, sqrt
 from typing import NamedTuple
 
 import numpy as np
@@ -27,6 +27,7 @@ from coop_drake.planning.cells.cells import FreeBox
 from coop_drake.planning.channel import Channel, CoveredPath, Regions
 from coop_drake.planning.duration import estimated, plan_time, timed
 from coop_drake.planning.limits import NEED_FACTOR, limits_of
+from coop_drake.planning.motion_limits import base_chains, base_places, motion_limits
 from coop_drake.planning.questions import shrunk
 from coop_drake.planning.rescaling import Rescaling
 from coop_drake.planning.sampling.collision import ObstacleGrid, grid_inside
@@ -147,6 +148,12 @@ LENGTH_STEP, ANGLE_STEP = 0.3, 0.15
 """Waypoints are no farther apart than this in position [m] and in every angle or joint [rad or m]: twice as
 many would make the choice of boxes four times as slow."""
 
+PASSING_SHARE = 0.4
+"""Share of these steps where the team passes from cell to cell: overlaps of boxes make it quicker [-]."""
+
+HEARD_AFTER = 0.18
+"""What a cell that the team passes needs besides the stop: words, and ramps of the brake, about [s]."""
+
 LONG_WAY, LONG_WAY_STEP = 30.0, 0.6
 """On a path longer than this [m] waypoints may be this far apart [m]: most boxes are much longer there."""
 
@@ -212,18 +219,20 @@ def cover_path(
     angle = float(path[-1, 2] + nearest_turn(float(problem.goal_pose[2] - path[-1, 2])))
     goals = np.array(final_intervals(problem, goal_values(problem, angle, path[-1, 2:])))
     limits = np.full(len(problem.start) - 1, np.inf) if limits is None else limits
+    passing = problem.settings.hand_over == "pass"
     # At a small margin some levels are equal; each is tried once.
     for least_clearance, pads in dict.fromkeys(
         (max(fraction * margin, LEAST_CLEARANCE), _wide(pads, 0.5 * least_overlap))
         for fraction, pads in LEVELS
     ):
-        points = _waypoints(boxes, grid, path, least_clearance, pads[0])
+        points = _waypoints(boxes, grid, path, least_clearance, pads[0], PASSING_SHARE if passing else 1.0)
         if points is None:
             continue
-        places = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points[:, :2], axis=0).T))])
+        steps = _seconds(problem, points) if passing else np.hypot(*np.diff(points[:, :2], axis=0).T)
+        places = np.concatenate([[0.0], np.cumsum(steps)])
         waypoints = Waypoints(
             boxes, grid, points, places, np.array(pads), goals, schedule_of(gain_set), limits,
-            least_clearance,
+            least_clearance, passing,
         )  # fmt: skip
         rows, margin = choose_boxes(waypoints), CORE_FRACTION * least_clearance
         regions = Regions(problem, swept, margin)
@@ -240,8 +249,18 @@ def _wide(pads: tuple[float, ...], least: float) -> tuple[float, ...]:
     return tuple(sorted({pad for pad in (*pads, least, 2.0 * least) if pad >= max(least, pads[0])}))
 
 
+def _seconds(problem: PlanningProblem, points: FloatArray) -> FloatArray:
+    """Return the shortest times from waypoint to waypoint at the limits of speed, shape (n - 1,) [s]."""
+    of = problem.limits
+    chains = base_chains(problem.tree, list(zip(of.base_components, of.base_points, strict=True)))
+    bases, steps = np.diff(base_places(chains, points), axis=1), np.diff(points, axis=0)
+    moved = [np.hypot(bases[..., 0], bases[..., 1]), np.abs(bases[..., 2]), np.abs(steps[:, 3:].T)]
+    seconds: FloatArray = (np.concatenate(moved) / motion_limits(of)[1:, :1]).max(axis=0)
+    return seconds
+
+
 def _waypoints(
-    boxes: BoxArrays, grid: ObstacleGrid, path: FloatArray, least_clearance: float, pad: float
+    boxes: BoxArrays, grid: ObstacleGrid, path: FloatArray, least_clearance: float, pad: float, share: float
 ) -> FloatArray | None:
     """Waypoints along a path, so close that one box holds each of them with the next, shape (n, 3 + m).
 
@@ -249,8 +268,8 @@ def _waypoints(
     """
     moves = np.abs(np.diff(path, axis=0))
     lengths = np.hypot(moves[:, 0], moves[:, 1])
-    step = LONG_WAY_STEP if lengths.sum() > LONG_WAY else LENGTH_STEP
-    paces = lengths / step, moves[:, 2:].max(axis=1) / ANGLE_STEP
+    step = LONG_WAY_STEP if lengths.sum() > LONG_WAY else share * LENGTH_STEP
+    paces = lengths / step, moves[:, 2:].max(axis=1) / (share * ANGLE_STEP)
     at = np.concatenate([[0.0], np.cumsum(np.maximum(*paces))])
 
     def configuration(s: float) -> FloatArray:
@@ -297,12 +316,13 @@ class Waypoints(NamedTuple):
         boxes: The team.
         grid: The floor.
         path: Waypoints z, circular axes unwrapped, shape (n, 3 + joints) [m, rad].
-        places: Where they lie along the path, shape (n,) [m].
+        places: Where they lie along the path, shape (n,) [m; s where the team passes].
         pads: Paddings of a box to choose from, shape (p,) [rad or m].
         goals: Lower and upper ends of the last goal intervals, shape (2, m) [rad, m].
         schedule: The rules by which gains are chosen.
         limits: Largest speed of the object, then largest rates of all axes, shape (1 + m,) [m/s, rad/s].
         least_clearance: Clearance that every waypoint must keep [m].
+        passing: Whether the team passes from cell to cell without a stop.
     """
 
     boxes: BoxArrays
@@ -314,6 +334,7 @@ class Waypoints(NamedTuple):
     schedule: Schedule
     limits: FloatArray
     least_clearance: float
+    passing: bool = False
 
 
 @compiled
@@ -346,7 +367,7 @@ def choose_boxes(waypoints: Waypoints) -> IntArray:
             for a in range(m):
                 least[i, a] = min(least[i, a], waypoints.path[j, 2 + a])
                 most[i, a] = max(most[i, a], waypoints.path[j, 2 + a])
-            if j - i > DENSE_ENDS and (j - i) % SPARSE_STEP != 0 and j + 1 < n:
+            if j - i > DENSE_ENDS and not waypoints.passing and (j - i) % SPARSE_STEP != 0 and j + 1 < n:
                 continue
             for p in range(count):
                 begun = time[i, p] + BOX_COST / waypoints.pads[p]
@@ -361,7 +382,7 @@ def choose_boxes(waypoints: Waypoints) -> IntArray:
                 if len(clearances) == 0 or clearances.min() < waypoints.least_clearance:
                     travel[i, p] = np.inf
                     continue
-                travel[i, p] = _travel(waypoints, i, j, clearances)
+                travel[i, p] = _travel(waypoints, i, j, clearances, waypoints.pads[p])
                 for q in range(nexts):
                     for a in range(m):
                         if j + 1 == n:
@@ -370,7 +391,9 @@ def choose_boxes(waypoints: Waypoints) -> IntArray:
                             low = waypoints.path[j, 2 + a] - waypoints.pads[q]
                             high = waypoints.path[j, 2 + a] + waypoints.pads[q]
                         goals[0, a], goals[1, a] = max(lower[a], low), min(upper[a], high)
-                    reached = begun + max(travel[i, p], _closing(waypoints, i, lower, upper, goals))
+                    reached = begun + travel[i, p]
+                    if not waypoints.passing:
+                        reached = max(reached, begun + _closing(waypoints, i, lower, upper, goals))
                     if reached < time[j, q]:
                         time[j, q] = reached
                         before[j, q, 0], before[j, q, 1] = i, p
@@ -384,15 +407,24 @@ def choose_boxes(waypoints: Waypoints) -> IntArray:
 
 
 @compiled
-def _travel(waypoints: Waypoints, i: int, j: int, clearances: FloatArray) -> float:
-    """Time in which the object passes a box at the governor's steady speed, from waypoint i to j [s].
+def _travel(waypoints: Waypoints, i: int, j: int, clearances: FloatArray, pad: float) -> float:
+    """Time in which the object passes a box, from waypoint i to j [s].
+
+    It is that at the governor's steady speed. A team that passes from cell to cell takes the pace v [-] from
+    which it can stop within the box once it has heard that all have entered it: with l the time of the box's
+    way at the limits of speed, and w that of the words, w v + v^2 / 2 = l.
 
     Args:
         waypoints: The waypoints.
         i: The first waypoint.
         j: The last one.
         clearances: Clearance at the waypoints in the box, shape (j - i + 1,) [m].
+        pad: Padding of the box [rad or m].
     """
+    if waypoints.passing:
+        way = waypoints.places[j] - waypoints.places[i]
+        pace = sqrt(HEARD_AFTER**2 + 2.0 * (way + 2.0 * pad)) - HEARD_AFTER
+        return float(way / min(1.0, pace))
     stiffness, damping, gain = scheduled_governor(waypoints.schedule, clearances.min())
     per_speed = steady_clearance(1.0, stiffness, damping, gain)
     fastest, seconds = min(gain * FIELD_SPEED, waypoints.limits[0]), 0.0

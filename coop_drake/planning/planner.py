@@ -95,9 +95,30 @@ def plan(
         if isinstance(near, Found | BeyondLimits):
             near = replace(near, plan=replace(near.plan, problem=problem_digest(problem)))
         if isinstance(near, Found):
-            return near
-    answer = _answer(problem, gain_set, gain_set_name, budget, progress, find_path)
+            return _passing(near, problem, gain_set, progress)
+    answer = _passing(
+        _answer(problem, gain_set, gain_set_name, budget, progress, find_path), problem, gain_set, progress
+    )
     return near if isinstance(answer, Undecided) and isinstance(near, BeyondLimits) else answer
+
+
+def _passing(
+    answer: PlanningResult, problem: PlanningProblem, gain_set: GainSet, progress: Progress | None
+) -> PlanningResult:
+    """Give a plan its motion where the team shall pass from cell to cell."""
+    if problem.settings.hand_over != "pass" or not isinstance(answer, Found):
+        return answer
+    from coop_drake.planning.motion import quickest_motion  # Here: it imports scipy.
+
+    age = gain_set.age if isinstance(gain_set, ScheduledGains) else 0.0
+    if progress is not None:
+        progress("planning the motion through all cells", 0.0)
+    try:
+        return replace(answer, plan=replace(answer.plan, motion=quickest_motion(answer.plan, problem, age)))
+    except PlanError as error:
+        return Undecided(
+            f"a plan was found, but no motion that passes its cells without a stop: {error}", answer.report
+        )
 
 
 def _answer(

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from shapely import Polygon, box
 
 from coop_drake.answers.budget import Budget
-from coop_drake.answers.problem import PlannerSettings, PlanningProblem
+from coop_drake.answers.problem import PlannerSettings, PlanningProblem, TeamLimits
 from coop_drake.geometry.passage import PassageFinder
 from coop_drake.geometry.sweeps import normals
 from coop_drake.laws import ScheduledGains
@@ -22,12 +24,17 @@ BUDGET = Budget(
 )  # fmt: skip
 """Departures of every kind that a plan can tolerate."""
 
+LIMITS = TeamLimits(
+    (1,), ((0.0, 0.0),), np.ones(1), np.ones(1), joint_rates=np.ones(1), joint_accelerations=np.ones(1)
+)
+"""Limits of the team that passes from cell to cell."""
+
 SLICES = 8
 """Slices of an exploration: its kernels are called in the first one."""
 
 
 def main() -> None:
-    """Plan for a square with one arm on an empty floor under a budget, and find a passage around a corner.
+    """Plan for a square with one arm on an empty floor, and find a passage around a corner.
 
     Together these call every kernel.
     """
@@ -46,6 +53,8 @@ def main() -> None:
         settings=PlannerSettings(margin=0.1),
     )
     plan(question, ScheduledGains(), gain_set_name="scheduled", budget=BUDGET)
+    passing = replace(question, settings=replace(question.settings, hand_over="pass"), limits=LIMITS)
+    plan(passing, ScheduledGains(), gain_set_name="scheduled")
     Proofs(question).run(SLICES)
     bent = Polygon([(0.0, 0.0), (3.0, 0.0), (3.0, 1.0), (1.0, 1.0), (1.0, 3.0), (0.0, 3.0)])
     PassageFinder(bent).find((2.5, 0.5), (0.5, 2.5))

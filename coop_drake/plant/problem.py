@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from math import inf
 from pathlib import Path
@@ -23,7 +23,7 @@ from coop_drake.plant.parsing import refusal
 from coop_drake.plant.team import RobotModel, TeamPlant, build_team_plant
 from coop_drake.scenario import Scenario, assemble
 from coop_drake.scenario.deployment import ALL_ROBOTS
-from coop_drake.scenario.model import RobotLimits
+from coop_drake.scenario.model import OBJECT, RobotLimits
 from coop_drake.tree.arrays import FloatArray
 from coop_drake.tree.component_tree import Body, ComponentTree, ConvexShape, PlanarPose
 
@@ -215,9 +215,25 @@ def _stated_limits(scenario: Scenario, joints: Mapping[str, int], limits: TeamLi
             for i, value in enumerate(given * count if len(given) == 1 else given):
                 values[first + i] = values[first + i] if value is None else value
         first += count
+    of_object = scenario.limits.get(OBJECT, RobotLimits()).acceleration
     return replace(
-        limits, base_speeds=speeds, turn_rates=turns, joint_rates=rates, joint_accelerations=accelerations
+        limits,
+        base_speeds=speeds,
+        turn_rates=turns,
+        joint_rates=rates,
+        joint_accelerations=accelerations,
+        base_accelerations=_of_bases(scenario, joints, "base_acceleration"),
+        turn_accelerations=_of_bases(scenario, joints, "base_turn_acceleration"),
+        base_jerks=_of_bases(scenario, joints, "base_jerk"),
+        object_acceleration=np.array([inf if of_object is None else of_object]),
     )
+
+
+def _of_bases(scenario: Scenario, robots: Iterable[str], name: str) -> FloatArray:
+    """Return a limit of every base that the scenario alone states; infinity for none."""
+    rows = [scenario.limits.get(robot, scenario.limits.get(ALL_ROBOTS, RobotLimits())) for robot in robots]
+    stated = [getattr(row, name) for row in rows]
+    return np.array([inf if value is None else value for value in stated])
 
 
 # Checks of a scenario that need its bodies and joints: joint values, start and goal.

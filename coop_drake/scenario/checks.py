@@ -4,7 +4,7 @@ Each check yields the faults that it finds as (key, value, what is allowed), so 
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import fields
+from dataclasses import fields, replace
 
 import numpy as np
 from shapely import LineString, Polygon, STRtree
@@ -13,7 +13,7 @@ from shapely.validation import explain_validity
 from coop_drake.errors import ScenarioError
 from coop_drake.scenario.deployment import ALL_ROBOTS, JointFriction
 from coop_drake.scenario.directives import assemble
-from coop_drake.scenario.model import Scenario, Workspace
+from coop_drake.scenario.model import OBJECT, RobotLimits, Scenario, Workspace
 
 Ring = Sequence[tuple[float, float]]
 Faults = Iterator[tuple[str, object, str]]
@@ -50,6 +50,11 @@ def _setting_faults(scenario: Scenario) -> Faults:
     if scenario.gains.selected not in scenario.gains.sets:
         known = ", ".join(sorted(scenario.gains.sets))
         yield "gains.selected", scenario.gains.selected, f"a gain set, one of {known}"
+    if scenario.planner.hand_over == "pass":
+        if not scenario.deployment.ideal or scenario.deployment.budget != "none":
+            yield "planner.hand_over", "pass", "rest where the section deployment is stated"
+        if scenario.control.hold is not None:
+            yield "planner.hand_over", "pass", "rest where control.hold is stated"
     hold = scenario.control.hold
     if hold is not None and hold.silence is not None and scenario.deployment.control_rate is None:
         yield "control.hold.silence", hold.silence, "null without deployment.control_rate"
@@ -59,8 +64,15 @@ def _name_faults(scenario: Scenario, robots: Sequence[str]) -> Faults:
     """Yield names of robots and bodies that the team does not have, and load shares that do not add up."""
     for section in ("fixed_joints", "load_shares", "limits"):
         for name in getattr(scenario, section):
-            if name not in robots and (section, name) != ("limits", ALL_ROBOTS):
+            if name not in robots and (section != "limits" or name not in (ALL_ROBOTS, OBJECT)):
                 yield f"{section}.{name}", name, "a robot, one of " + ", ".join(robots)
+    if OBJECT in robots:
+        yield "robots", OBJECT, f"another name: limits.{OBJECT} has the limits of the object"
+    for name, stated in scenario.limits.items():
+        if name != OBJECT and stated.acceleration is not None:
+            yield f"limits.{name}.acceleration", stated.acceleration, f"null: it belongs to limits.{OBJECT}"
+        if name == OBJECT and replace(stated, acceleration=None) != RobotLimits():
+            yield f"limits.{name}", name, "acceleration alone"
     for name in scenario.deployment.robots:
         if name not in (*robots, ALL_ROBOTS):
             known = f'a robot, one of {", ".join(robots)}, or "{ALL_ROBOTS}"'

@@ -220,6 +220,10 @@ class VisualizationSettings:
     show_collision: bool = False
 
 
+OBJECT = "object"
+"""Name under which the limits of the object stand."""
+
+
 @dataclass(frozen=True)
 class RobotLimits:
     """Limits of one robot; each replaces what the robot's model says, null keeps that.
@@ -230,12 +234,22 @@ class RobotLimits:
         joint_rates: Largest rates of the joints, from the base to the end effector; a single one counts for
             all [rad/s or m/s].
         joint_accelerations: Largest accelerations of the joints, likewise [rad/s^2 or m/s^2].
+        base_acceleration: Largest acceleration of the base's frame [m/s^2]. This and the next two count for
+            ``hand_over: pass``; null stands for 1 m/s^2, 2 rad/s^2 and 10 m/s^3.
+        base_turn_acceleration: Largest acceleration of the base's angle [rad/s^2].
+        base_jerk: Largest jerk of the base's frame [m/s^3].
+        acceleration: Largest acceleration of the object, under the name ``object`` alone, likewise; null
+            stands for 1.5 m/s^2 [m/s^2].
     """
 
     base_speed: Positive | None = None
     base_turn_rate: Positive | None = None
     joint_rates: tuple[Positive | None, ...] = ()
     joint_accelerations: tuple[Positive | None, ...] = ()
+    base_acceleration: Positive | None = None
+    base_turn_acceleration: Positive | None = None
+    base_jerk: Positive | None = None
+    acceleration: Positive | None = None
 
 
 EnergyShare = Annotated[float, Limits(at_least=1.0)]

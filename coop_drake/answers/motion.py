@@ -1,0 +1,75 @@
+"""The nominal motion of a plan whose team passes from cell to cell without a stop."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated
+
+import numpy as np
+
+from coop_drake.answers.document import Corners
+from coop_drake.tree.arrays import FloatArray
+from coop_drake.typed_data import EXACT, Codec, DataError, NotNegative, Number, Positive, Vector
+
+FEWEST_POINTS = 7
+"""Control points of the shortest motion: three at rest at either end, and one between."""
+
+BASE_SPEED, TURN_RATE, BASE_ACCELERATION, TURN_ACCELERATION, BASE_JERK = 1.0, 1.5, 1.0, 2.0, 10.0
+"""Limits of bases of which nothing is known [m/s, rad/s, m/s^2, rad/s^2, m/s^3]."""
+
+JOINT_RATE, JOINT_ACCELERATION, OBJECT_ACCELERATION = 1.0, 2.0, 1.5
+"""Limits of joints and of the object of which nothing is known [rad/s, rad/s^2; m/s, m/s^2; m/s^2]."""
+
+LARGEST_DAMPING, AGE_PHASE = 20.0, 0.4
+"""zeta_t is no larger [1/s], and no larger than this phase over the age of the commands [rad]; the pull is
+critically damped."""
+
+
+def _read_rows(rows: tuple[tuple[float, ...], ...]) -> FloatArray:
+    lengths = {len(row) for row in rows}
+    if len(rows) < FEWEST_POINTS or len(lengths) != 1:
+        allowed = f"a list of at least {FEWEST_POINTS} lists of equal length"
+        raise DataError("", [list(row) for row in rows[:3]], allowed)
+    return np.array(rows, dtype=np.float64)
+
+
+Rows = Annotated[FloatArray, Codec(tuple[tuple[Number, ...], ...], _read_rows, np.ndarray.tolist)]
+
+
+@dataclass(frozen=True)
+class Motion:
+    """One motion of the whole team through all cells: a cubic B-spline with equal spans, from rest to rest.
+
+    With p_0 ... p_(m-1) the control points and h the length of a span, the motion at the knot t = k h is
+    (p_k + 4 p_(k+1) + p_(k+2)) / 6, its velocity (p_(k+2) - p_k) / (2 h), and its acceleration
+    (p_k - 2 p_(k+1) + p_(k+2)) / h^2, which is linear between knots.
+
+    A robot begins cell i at the time tau_i at which the motion enters it, and says so. Who has not heard that
+    all have begun cell i by tau_i + 2 W brakes there, and everybody does. Braking, the pace falls from 1 at
+    the rate kappa_i, reached within r, and comes to rest before the motion leaves cell i.
+
+    Attributes:
+        points: Control points z = (x, y, theta, q...), the first three equal, the last three equal, shape
+            (m, 3 + n) [m, rad].
+        period: h [s].
+        windows: tau_i, when the motion enters every cell, and x_i, when it leaves it, shape (cells, 2) [s].
+        rates: kappa_i, zero for the last cell, which is not left, shape (cells,) [1/s].
+        waiting: 2 W [s].
+        ramp: r [s].
+        stiffness: K_t, with which object and joints are pulled to the motion [1/s^2].
+        damping: zeta_t, with which their rates are [1/s].
+    """
+
+    points: Rows
+    period: Annotated[Positive, EXACT]
+    windows: Corners
+    rates: Vector
+    waiting: Annotated[NotNegative, EXACT]
+    ramp: Annotated[Positive, EXACT]
+    stiffness: Annotated[Positive, EXACT]
+    damping: Annotated[Positive, EXACT]
+
+    @property
+    def duration(self) -> float:
+        """How long it takes [s]."""
+        return (len(self.points) - 3) * self.period

@@ -1,0 +1,553 @@
+"""The quickest motion of a team through the cells of a plan from which it can stop before it leaves them.
+
+The motion is a curve z(u) of configurations z = (x, y, theta, q...) with a time t(u), both uniform cubic
+B-splines of the same parameter u. Between two knots, in one span, a spline stays in the convex hull of its
+four Bezier points. So it suffices that these lie in the span's cells: in the boxes of (theta, q...), and in
+half-planes that cut off all edges of the position regions. With dots for derivatives by t,
+
+z' = z_u / t_u,  z'' = (z_uu - z' t_uu) / t_u^2.
+
+Along it the team runs at the pace rho, which is 1 but where it brakes or starts: its velocities are rho
+times those of the motion, its accelerations rho^2 A + rho' V, for the object, the bases and the joints
+alike, with V and A those at pace 1.
+
+The rule. A robot says that it has begun cell i when it enters it, at the time tau_i. The others know it a
+time W later and may have to say so, so that a team that lacks the word brakes at beta_i = tau_i + 2 W. It
+must then stop before x_i, where the motion leaves cell i. rho' falls to -kappa_i within a time r, and rises
+to zero within r at the end. A stop from rho = 1 so takes 1 / kappa_i + r, half of which is the way in t:
+kappa_i = 1 / (2 (x_i - beta_i) - r). From beta_(i-1) to x_i all
+accelerations s A - kappa_i V, with s = 0 and s = 1, are within their limits, and therefore all of
+rho^2 A + rho' V with rho from 0 to 1 and rho' from -kappa_i to 0: the team can brake at any time.
+
+The program. t at the end is minimised with a logarithmic barrier for each limit, by Newton's method with
+the Gauss-Newton part of the second derivatives. All terms but kappa join at most four neighbouring control
+points, so that the matrix has a band; kappa_i joins the control points about tau_i and x_i, through as many
+more unknowns as there are cells. First, t is free: the spans of every cell then stay the same. Then, the
+motion is written as a spline of the time with equal spans, whose length is the only unknown time: its
+accelerations are linear between knots, where all limits are checked.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+from math import inf, isfinite
+from typing import NamedTuple
+
+import numpy as np
+import scipy.linalg
+import shapely
+from numpy.typing import NDArray
+
+from coop_drake.answers.motion import AGE_PHASE, LARGEST_DAMPING, Motion
+from coop_drake.answers.plan import Plan
+from coop_drake.answers.problem import PlanningProblem
+from coop_drake.errors import PlanError
+from coop_drake.geometry.polygons import edges_of
+from coop_drake.jit import compiled
+from coop_drake.planning.motion_barrier import (
+    BEZIER,
+    BRAKES,
+    HALF_PLANES,
+    Course,
+    Slopes,
+    add_times,
+    barrier,
+    lay_planes,
+    newton_step,
+)
+from coop_drake.planning.motion_limits import Chains, base_chains, base_places, largest_shares, motion_limits
+from coop_drake.tree.arrays import FloatArray, IntArray
+
+SPAN_TIME = 0.3
+"""Time of a span at the speed limits, before the program [s]."""
+
+PERIOD = 0.08
+"""Time of a span of the motion that is made, about [s]."""
+
+PARTS = 4
+"""Parts of a span of the motion that is made, at whose ends cells may be entered and left [-]."""
+
+OVERLAP_SPANS = 3.0
+"""Fewest spans of an overlap of two cells, before the program [-]; doubled where these are too few."""
+
+CLEARANCE_SPANS = 1.0
+"""Spans per way as long as the clearance there, before the program [-]."""
+
+SAMPLES = 24
+"""Samples of the first way in a cell [-]."""
+
+WAITING = 0.128
+"""2 W for words that are up to 50 ms old, clocks that are 2 ms off and a control period of 5 ms [s]:
+W = 50 ms + 2 * 2 ms + 2 * 5 ms."""
+
+SHORTEST_SPAN = 0.01
+"""Shortest time between two control points, while the time is free [s]."""
+
+SHORTEST_OVERLAP = 0.03
+"""Shortest time between the control points of one span in every overlap, while the time is free [s]."""
+
+BRAKE_RAMP = 0.1
+"""r, the time in which the team begins and ends to brake [s]."""
+
+WEIGHTS = (0.2, 0.06, 0.02, 8e-3, 3e-3, 1e-3, 3e-4)
+"""Weights of the barrier while the time is free [s]."""
+
+UNIFORM_WEIGHTS = (2e-4, 3e-5)
+"""Weights of the barrier while spans are equal [s]."""
+
+DONE = 50.0
+"""The next weight is taken when the slope of a step is less steep than this number of weights [-]."""
+
+MARGIN, MARGIN_SHARE = 1e-3, 0.02
+"""A motion keeps so much from the ends of its cells' intervals [rad or m], and from the boundaries of regions
+[m]; at most this share of an interval, and half of what there is of a region [-]. So the log of a run shows,
+between its rows, too, that it stayed in the cells."""
+
+LIMIT_SHARE = 0.995
+"""Share of every limit that a motion uses [-]: the team departs from it by rounding and integration."""
+
+FINER = 2
+"""How often spans are halved where the motion to begin with does not enter every cell [-]."""
+
+STEPS, ROUNDS = 2, 80
+"""Newton steps with the same half-planes, and largest number of times that these are laid anew [-]."""
+
+SLOWER = 1.01
+"""Factor by which all times grow until every limit is kept [-]."""
+
+ACCEPTED = 0.01
+"""Share of the decrease that the slope promises with which a step is accepted [-]."""
+
+
+# The way to begin with: along the plan's paths, every span in a cell.
+
+
+def first_points(plan: Plan, chains: Chains, limits: FloatArray, overlap: float) -> FloatArray:
+    """Return control points along the paths of a plan's transitions, three at rest at either end, (m, 3 + n).
+
+    Angles and joints move evenly from the middle of one goal interval to that of the next. Spans are shorter
+    where two cells overlap for a short way only, and where there is little clearance.
+
+    Args:
+        plan: The plan.
+        chains: The bases.
+        limits: Largest velocities and accelerations, see ``motion_limits``.
+        overlap: Fewest spans of an overlap of two cells [-].
+    """
+    ways, clearances, overlaps, resting = [], [], [], plan.start[2:]
+    for index, transition in enumerate(plan.transitions):
+        goal = 0.5 * (transition.goal_lower + transition.goal_upper)
+        if index + 1 == len(plan.transitions):
+            wanted = (plan.goal_pose[2], *plan.goal_joints)
+            kept = np.clip(resting, transition.goal_lower, transition.goal_upper)
+            goal = np.array([k if w is None else w for k, w in zip(kept, wanted, strict=True)])
+        line, shares = shapely.LineString(transition.path), np.linspace(0.0, 1.0, SAMPLES)
+        places = shapely.get_coordinates(shapely.line_interpolate_point(line, shares, normalized=True))
+        ways.append(np.hstack([places, resting + shares[:, None] * (goal - resting)]))
+        region = plan.governed(index)
+        clearances.append(shapely.distance(shapely.boundary(region), shapely.points(places)))
+        resting = goal
+    for index, (before, after) in enumerate(pairwise(ways)):
+        overlaps.append((_inside(plan, index + 1, before), _inside(plan, index, after)))
+    way, clearance = np.concatenate(ways), np.concatenate(clearances)
+    steps, bases = np.diff(way, axis=0), np.diff(base_places(chains, way), axis=1)
+    turned = np.concatenate(
+        [np.hypot(bases[..., 0], bases[..., 1]), np.abs(bases[..., 2]), np.abs(steps[:, 3:].T)]
+    )
+    speeds = np.where(np.isfinite(limits[1:, 0]), limits[1:, 0], 1.0)
+    spans = (turned / speeds[:, None]).max(axis=0) / SPAN_TIME
+    room = np.maximum(np.minimum(clearance[1:], clearance[:-1]), 1e-4)
+    spans = np.maximum(spans, CLEARANCE_SPANS * np.hypot(*steps[:, :2].T) / room)
+    for index, (reached, left) in enumerate(overlaps):
+        middle = (index + 1) * SAMPLES
+        begin = middle - 1 - int(np.argmin(np.append(reached[::-1], False)))
+        end = middle + int(np.argmin(np.append(left, False)))
+        piece = slice(max(begin, 0), min(end, len(spans)))
+        have = spans[piece].sum()
+        if have > 0.0:
+            spans[piece] *= max(1.0, overlap / have)
+        else:
+            spans[piece] = overlap / max(piece.stop - piece.start, 1)
+    at = np.append(0.0, np.cumsum(spans))
+    places = np.linspace(0.0, at[-1], max(int(np.ceil(at[-1])) + 1, 5))
+    inner = np.stack([np.interp(places, at, column) for column in way.T], axis=1)
+    return np.concatenate([inner[:1], inner[:1], inner, inner[-1:], inner[-1:]])
+
+
+def _inside(plan: Plan, index: int, way: FloatArray) -> NDArray[np.bool_]:
+    """Return which samples of a way are in a cell, shape (samples,)."""
+    cell, axes = plan.cells[index], way[:, 2:]
+    boxed: NDArray[np.bool_] = np.all((axes > cell.lower) & (axes < cell.upper), axis=1)
+    boxed[boxed] = shapely.contains_xy(plan.governed(index), *way[boxed, :2].T)
+    return boxed
+
+
+class CellSets(NamedTuple):
+    """The cells of a plan, less a margin that a motion keeps to the ends of the axes' intervals.
+
+    Attributes:
+        lower: Lower ends of (theta, q...), shape (cells, 1 + n) [rad, m].
+        upper: Upper ends.
+        regions: The position regions, prepared.
+        edges: Edges of all regions, shape (E, 4) [m].
+        ends: First edge of every cell and the edge after the last one, shape (cells + 1,).
+    """
+
+    lower: FloatArray
+    upper: FloatArray
+    regions: list[shapely.Polygon]
+    edges: FloatArray
+    ends: IntArray
+
+
+def cell_sets(plan: Plan) -> CellSets:
+    """Return the cells of a plan as a motion sees them."""
+    lower, upper = (np.array([getattr(cell, end) for cell in plan.cells]) for end in ("lower", "upper"))
+    kept = np.minimum(MARGIN, MARGIN_SHARE * (upper - lower))
+    regions = [plan.governed(index) for index in range(len(plan.cells))]
+    shapely.prepare(regions)
+    rings = [edges_of(region) for region in regions]
+    ends = np.cumsum([0, *(len(ring) for ring in rings)])
+    return CellSets(lower + kept, upper - kept, regions, np.concatenate(rings), ends)
+
+
+def bezier_points(parts: int) -> FloatArray:
+    """Return the Bezier points of equal parts of a span by its control points, shape (parts, 4, 4)."""
+    found = np.empty((parts, 4, 4))
+    for part in range(parts):
+        ends = (part / parts, (part + 1) / parts)
+        for row in range(4):
+            points = BEZIER
+            for level in range(3):
+                s = ends[level >= 3 - row]
+                points = (1.0 - s) * points[:-1] + s * points[1:]
+            found[part, row] = points[0]
+    return found
+
+
+def pieces_inside(cells: CellSets, points: FloatArray, shares: FloatArray) -> NDArray[np.bool_]:
+    """Return which parts of spans lie in which cells, their Bezier points and the hull of these.
+
+    Args:
+        cells: The cells.
+        points: Control points of z, shape (m, 3 + n).
+        shares: See ``bezier_points``.
+
+    Returns:
+        Shape (cells, spans * parts).
+    """
+    spans = np.lib.stride_tricks.sliding_window_view(points, 4, axis=0)  # (spans, 3 + n, 4)
+    pieces = np.einsum("ske,qbe->sqkb", spans, shares).reshape(-1, points.shape[1], 4)
+    inside = np.zeros((len(cells.regions), len(pieces)), bool)
+    least, most = pieces[:, 2:].min(axis=2), pieces[:, 2:].max(axis=2)
+    for index, region in enumerate(cells.regions):
+        found = ((least > cells.lower[index]) & (most < cells.upper[index])).all(axis=1)
+        lines = shapely.linestrings(pieces[found][:, :2].transpose(0, 2, 1))
+        inside[index, found] = shapely.contains_properly(region, shapely.convex_hull(lines))
+    return inside
+
+
+def pieces_of_cells(inside: NDArray[np.bool_]) -> tuple[IntArray, IntArray]:
+    """Return the first and the last piece of every cell; neighbours share at least one.
+
+    Raises:
+        PlanError: The pieces leave the cells; names the first one that is not reached.
+    """
+    cells, pieces = inside.shape
+    first, last, begin = np.zeros(cells, np.int64), np.zeros(cells, np.int64), 0
+    for cell in range(cells):
+        row = inside[cell]
+        begin = begin + int(np.argmax(row[begin:] & (inside[max(cell - 1, 0), begin:])))
+        low = high = begin
+        if not row[begin]:
+            raise PlanError(f"the way to begin with does not enter cell {cell}")
+        while low > 0 and row[low - 1]:
+            low -= 1
+        while high + 1 < pieces and row[high + 1]:
+            high += 1
+        first[cell], last[cell] = low, high
+    if first[0] != 0 or last[-1] != pieces - 1:
+        raise PlanError("the way to begin with leaves the first or the last cell")
+    return first, last
+
+
+# The program.
+
+
+@compiled(borrows=True)
+def brake(
+    points: FloatArray, windows: FloatArray, waiting: float, kappa: FloatArray, acting: IntArray
+) -> bool:
+    """Write kappa of every cell but the last, and where it may act; return whether cells last long enough.
+
+    Args:
+        points: Control points (z, t), shape (m, D).
+        windows: u at which the motion enters every cell and at which it leaves it, shape (cells, 2).
+        waiting: 2 W, from tau_i to beta_i [s].
+        kappa: Receives the rates, shape (cells,) [1/s].
+        acting: See ``barrier``; receives cells.
+    """
+    m, T = points.shape[0], points.shape[1] - 1
+    before = -np.inf
+    for j in range(m):
+        acting[j, 0] = 0
+    for cell in range(len(windows) - 1):
+        tau = x = 0.0
+        for e in range(4):
+            tau += time_shares(windows[cell, 0])[e] * points[int(windows[cell, 0]) + e, T]
+            x += time_shares(windows[cell, 1])[e] * points[int(windows[cell, 1]) + e, T]
+        left = 2.0 * (x - tau - waiting) - BRAKE_RAMP
+        if not left > 0.0:
+            return False
+        kappa[cell] = 1.0 / left
+        for j in range(1, min(int(windows[cell, 1]) + 3, m - 1)):
+            if points[j + 1, T] >= before:
+                if acting[j, 0] == BRAKES:
+                    return False
+                acting[j, 0] += 1
+                acting[j, acting[j, 0]] = cell
+        before = tau + waiting
+    return True
+
+
+@compiled(inlined=True)
+def time_shares(u: float) -> tuple[float, float, float, float]:
+    """Return by which shares of control points int(u) ... int(u) + 3 t is found at u, or between two knots.
+
+    Between knots, t is taken linear, as it is where spans are equal.
+    """
+    s = u - int(u)
+    return (1.0 - s) / 6.0, (4.0 - 3.0 * s) / 6.0, (1.0 + 3.0 * s) / 6.0, s / 6.0
+
+
+def quickest_motion(
+    plan: Plan, problem: PlanningProblem, age: float = 0.0, waiting: float = WAITING
+) -> Motion:
+    """Return the quickest motion found.
+
+    Args:
+        plan: The plan, with its cells.
+        problem: The question that it answers, with the team and its limits.
+        age: How old commands are when they act: what is measured, computed, and followed with a lag [s].
+        waiting: 2 W, how long after a cell is begun robots may know it of each other [s].
+
+    Raises:
+        PlanError: No motion was found that stays in the cells; says where.
+    """
+    of = problem.limits
+    chains = base_chains(problem.tree, list(zip(of.base_components, of.base_points, strict=True)))
+    table = LIMIT_SHARE * motion_limits(of)
+    cells = cell_sets(plan)
+    free = np.where([True, True, False], table, inf)  # Jerk is limited where spans are equal.
+    for finer in range(FINER + 1):
+        points = first_points(plan, chains, table, OVERLAP_SPANS * 2**finer)
+        points = np.column_stack([points, SPAN_TIME * (np.arange(len(points)) - 1.0)])
+        try:
+            program = _Program(cells, chains, free, waiting, points, uniform=False)
+            break
+        except PlanError:
+            if finer == FINER:
+                raise
+    program.solve(WEIGHTS)
+    for finer in range(FINER + 1):
+        equal = uniform_points(program.points, PERIOD / 2**finer)
+        try:
+            last = _Program(cells, chains, table, waiting, equal, uniform=True)
+            break
+        except PlanError:
+            if finer == FINER:
+                raise
+    last.solve(UNIFORM_WEIGHTS)
+    damping = min(LARGEST_DAMPING, AGE_PHASE / age) if age > 0.0 else LARGEST_DAMPING
+    return Motion(*last.slowed(), waiting, BRAKE_RAMP, 0.25 * damping * damping, damping)
+
+
+def uniform_points(points: FloatArray, period: float) -> FloatArray:
+    """Return a motion as a spline of the time with equal spans, through the same places at its knots.
+
+    Args:
+        points: Control points (z, t), shape (m, D).
+        period: Time of a span, about [s].
+
+    Returns:
+        Control points (z, t), t that of equal spans.
+    """
+    u = np.linspace(0.0, len(points) - 3.0, 16 * (len(points) - 3) + 1)
+    span = np.minimum(u.astype(int), len(points) - 4)
+    s = (u - span)[:, None]
+    dense = (
+        (1.0 - s) ** 3 * points[span] + (3.0 * s**3 - 6.0 * s**2 + 4.0) * points[span + 1]
+        + (3.0 * (1.0 - s) ** 3 - 6.0 * (1.0 - s) ** 2 + 4.0) * points[span + 2] + s**3 * points[span + 3]
+    ) / 6.0  # fmt: skip
+    count = max(int(np.ceil((dense[-1, -1] - dense[0, -1]) / period)), 6)
+    times = np.linspace(dense[0, -1], dense[-1, -1], count + 1)
+    knots = np.stack([np.interp(times, dense[:, -1], column) for column in dense[:, :-1].T], axis=1)
+    found = np.empty((count + 3, points.shape[1]))
+    found[:3, :-1], found[-3:, :-1] = points[0, :-1], points[-1, :-1]
+    # The second knot and the last but one are free: there, rest at the ends decides.
+    band = np.array([[1.0], [4.0], [1.0]]) / 6.0 * np.ones(count - 3)
+    right = knots[2:-2].copy()
+    right[0] -= found[2, :-1] / 6.0
+    right[-1] -= found[-3, :-1] / 6.0
+    found[3:-3, :-1] = scipy.linalg.solve_banded((1, 1), band, right)
+    found[:, -1] = (times[1] - times[0]) * (np.arange(count + 3) - 1.0)
+    return found
+
+
+@dataclass
+class _Program:
+    """The state of the program.
+
+    Attributes:
+        cells: The cells.
+        chains: The bases.
+        limits: Largest velocities, accelerations and jerks, see ``motion_limits``.
+        waiting: 2 W [s].
+        points: Control points (z, t), shape (m, D).
+        uniform: Whether all spans last equally long.
+    """
+
+    cells: CellSets
+    chains: Chains
+    limits: FloatArray
+    waiting: float
+    points: FloatArray
+    uniform: bool
+
+    def __post_init__(self) -> None:
+        """Find the pieces of cells, and what is held: rest at both ends, and the time at the beginning."""
+        self.shares = bezier_points(PARTS if self.uniform else 1)
+        self.first, self.last = pieces_of_cells(self._inside(self.shares))
+        m, D = self.points.shape
+        fixed = np.zeros((m, D), bool)
+        fixed[:3, :-1] = fixed[-3:, :-1] = fixed[1, -1] = True
+        fixed[:, -1] |= self.uniform
+        self.held, self.lengths = fixed.ravel(), np.zeros(m * D)
+        if self.uniform:
+            self.lengths[D - 1 :: D] = np.arange(m) - 1.0
+        self.kappa, self.acting = np.zeros(len(self.first)), np.zeros((m, 1 + BRAKES), np.int64)
+        self.steps = 0
+
+    def _inside(self, shares: FloatArray) -> NDArray[np.bool_]:
+        return pieces_inside(self.cells, self.points[:, :-1], shares)
+
+    def solve(self, weights: tuple[float, ...]) -> None:
+        """Take Newton steps with smaller and smaller weights of the barrier."""
+        at = 0
+        for _ in range(ROUNDS):
+            self.lay_course()
+            done = self.improve(weights[at])
+            if done and at + 1 == len(weights):
+                return
+            at += done
+
+    def lay_course(self) -> None:
+        """Let cells have all pieces that lie in them, and lay half-planes about these."""
+        inside, cells, parts = self._inside(self.shares), len(self.first), len(self.shares)
+        for cell in range(cells):
+            low, high = self.first[cell], self.last[cell]
+            while low > 0 and inside[cell, low - 1] and (cell == 0 or low - 1 > self.first[cell - 1]):
+                low -= 1
+            while high + 1 < inside.shape[1] and inside[cell, high + 1]:
+                high += 1
+            self.first[cell], self.last[cell] = low, high
+        self.windows = np.stack([self.first, self.last + 1], axis=1) / parts
+        numbers = np.arange(inside.shape[1])
+        held = (self.first[:, None] <= numbers) & (numbers <= self.last[:, None])
+        spans, parts_of = np.divmod(numbers, parts)
+        shares = self.shares[parts_of]
+        if parts > 1:  # Spans whose parts lie in the same cells, as they do as a whole, are one piece.
+            whole = self._inside(BEZIER[None])
+            each = held.reshape(cells, -1, parts)
+            alike = (each == each[:, :, :1]).all(axis=(0, 2)) & (whole >= each[:, :, 0]).all(axis=0)
+            kept = ~alike[spans] | (parts_of == 0)
+            shares[alike[spans]] = BEZIER
+            held, spans, shares = held[:, kept], spans[kept], shares[kept]
+        lower = np.where(held[..., None], self.cells.lower[:, None], -inf)
+        upper = np.where(held[..., None], self.cells.upper[:, None], inf)
+        pairs = np.stack([np.argmax(held, axis=0), cells - 1 - np.argmax(held[::-1], axis=0)], axis=1)
+        planes, counts = np.zeros((len(spans), HALF_PLANES, 3)), np.zeros(len(spans), np.int64)
+        places = self.points[spans[:, None] + np.arange(4), :2]
+        hulls, edges, ends = np.einsum("pbe,pei->pbi", shares, places), self.cells.edges, self.cells.ends
+        least = lay_planes(hulls, pairs, edges, ends, MARGIN, planes, counts)
+        if not least > 0.0:
+            raise PlanError("a span of the motion meets the boundary of its cell")
+        self.shortest = np.full(len(self.points) - 1, SHORTEST_SPAN)
+        if not self.uniform:
+            steps = np.diff(self.points[:, -1])
+            for before, after in zip(self.last[:-1], self.first[1:], strict=True):
+                longest = after + int(np.argmax(steps[after + 1 : before + 2]))
+                self.shortest[longest + 1] = min(SHORTEST_OVERLAP, 0.999 * steps[longest + 1])
+        self.course = Course(
+            self.chains, self.limits, spans, shares, lower.max(axis=0), upper.min(axis=0), planes, counts
+        )
+
+    def value(self, points: FloatArray, weight: float, slopes: Slopes | None = None) -> float:
+        """Return what is minimised, infinite where a limit is not kept, and add its derivatives."""
+        if not brake(points, self.windows, self.waiting, self.kappa, self.acting):
+            return inf
+        given = slopes or Slopes(*(np.empty(shape) for shape in ((0, 0), 0, (0, 0), (0, 0), 0)))
+        value = float(points[-2, -1])
+        value += barrier(points, weight, self.course, self.kappa, self.acting, given, slopes is not None)
+        if not self.uniform:
+            value += add_times(points, 0.1 * weight, self.shortest, given, slopes is not None)
+        return value
+
+    def improve(self, weight: float) -> bool:
+        """Take a few Newton steps; returns whether the next weight may be taken."""
+        (m, D), cells = self.points.shape, len(self.first)
+        now = self.value(self.points, weight)
+        while not isfinite(now):
+            self.points[:, -1] *= SLOWER
+            if not self.points[-2, -1] < 1e4:
+                raise PlanError("no pace keeps the limits in the plan's cells")
+            now = self.value(self.points, weight)
+        for _ in range(STEPS):
+            slopes = Slopes(
+                np.zeros((m * D, 4 * D)), np.zeros(m * D), np.zeros((cells, m * D)), np.zeros((cells, cells)),
+                np.zeros(cells),
+            )  # fmt: skip
+            self.value(self.points, weight, slopes)
+            slopes.point[(m - 2) * D + D - 1] += 1.0
+            step, places, shares = np.empty(m * D), np.zeros((cells, 8), np.int64), np.zeros((cells, 8))
+            for cell in range(cells - 1):
+                for end, sign in enumerate((2.0, -2.0)):
+                    u = self.windows[cell, end]
+                    each = slice(4 * end, 4 * end + 4)
+                    places[cell, each] = (np.minimum(int(u) + np.arange(4), m - 1) + 1) * D - 1
+                    shares[cell, each] = sign * self.kappa[cell] * np.array(time_shares(u))
+            slope = newton_step(slopes, places, shares, self.held, self.lengths, step)
+            self.steps += 1
+            share = 1.0
+            while share > 1e-5:
+                moved = self.points + share * step.reshape(m, D)
+                then = self.value(moved, weight)
+                if then < now + ACCEPTED * share * slope:
+                    break
+                share *= 0.4
+            else:
+                return True
+            self.points, now = moved, then
+            if -slope < 3.0 * weight:
+                return True
+        return -slope < DONE * weight
+
+    def slowed(self) -> tuple[FloatArray, float, FloatArray, FloatArray]:
+        """Return control points, period, windows and rates, slowed as limits between knots ask for."""
+        points, (period, factor) = self.points[:, :-1].copy(), (self.points[2, -1] - self.points[1, -1], 1.0)
+        for _ in range(2):
+            period *= factor
+            brake(
+                self.points * np.append(np.ones(points.shape[1]), factor),
+                self.windows,
+                self.waiting,
+                self.kappa,
+                self.acting,
+            )
+            windows = period * self.windows
+            begin = np.append(-inf, windows[:-1, 0] + self.waiting)[:-1]
+            ranges = np.stack([begin, windows[:-1, 1]], axis=1)
+            fast, hard, rough = largest_shares(points, period, self.chains, self.limits, self.kappa, ranges)
+            factor = max(fast, hard**0.5, rough ** (1.0 / 3.0), 1.0)
+        return points, float(period), windows, self.kappa.copy()

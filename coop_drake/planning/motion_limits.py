@@ -1,0 +1,278 @@
+"""What moves with a configuration: the object, the bases, their angles and the joints; and their limits."""
+
+from __future__ import annotations
+
+from math import cos, inf, sin
+from typing import NamedTuple
+
+import numpy as np
+
+from coop_drake.answers.motion import (
+    BASE_ACCELERATION,
+    BASE_JERK,
+    BASE_SPEED,
+    JOINT_ACCELERATION,
+    JOINT_RATE,
+    OBJECT_ACCELERATION,
+    TURN_ACCELERATION,
+    TURN_RATE,
+)
+from coop_drake.answers.problem import TeamLimits
+from coop_drake.jit import compiled
+from coop_drake.tree.arrays import FloatArray, IntArray
+from coop_drake.tree.component_tree import ComponentTree
+
+
+class Chains(NamedTuple):
+    """Where the bases are: p_B = p + sum over links of R(phi_k) (c_k + q_k d_k), phi_k linear in the axes.
+
+    Attributes:
+        turns: What a unit of every axis (theta, q...) adds to phi_k, shape (bases, links, 1 + n) [-].
+        offsets: phi_k where all axes are zero, shape (bases, links) [rad].
+        arms: c_k, shape (bases, links, 2) [m].
+        slides: Which axis slides the arm, -1 for none, shape (bases, links).
+        directions: d_k, shape (bases, links, 2) [-].
+        links: Number of links of every base, shape (bases,).
+    """
+
+    turns: FloatArray
+    offsets: FloatArray
+    arms: FloatArray
+    slides: IntArray
+    directions: FloatArray
+    links: IntArray
+
+
+def motion_limits(limits: TeamLimits) -> FloatArray:
+    """Return the largest velocity, acceleration and jerk of object, bases, bases' angles and joints, (P, 3).
+
+    Args:
+        limits: What models and scenario state; where they state nothing, those of ``answers/motion`` count.
+    """
+    robots, joints = len(limits.base_components), len(limits.joint_rates)
+    rows = [
+        (1, None, (limits.object_acceleration, OBJECT_ACCELERATION), None),
+        (
+            robots,
+            (limits.base_speeds, BASE_SPEED),
+            (limits.base_accelerations, BASE_ACCELERATION),
+            (limits.base_jerks, BASE_JERK),
+        ),
+        (robots, (limits.turn_rates, TURN_RATE), (limits.turn_accelerations, TURN_ACCELERATION), None),
+        (joints, (limits.joint_rates, JOINT_RATE), (limits.joint_accelerations, JOINT_ACCELERATION), None),
+    ]
+    return np.concatenate(
+        [np.column_stack([_known(count, kind) for kind in kinds]) for count, *kinds in rows]
+    )
+
+
+def _known(count: int, limit: tuple[FloatArray, float] | None) -> FloatArray:
+    """Return what is stated of a kind of limit, and what counts otherwise; infinity for none, (count,)."""
+    if limit is None:
+        return np.full(count, inf)
+    stated, otherwise = limit
+    return np.where(np.isfinite(stated), stated, otherwise) if stated.size else np.full(count, otherwise)
+
+
+def base_chains(tree: ComponentTree, bases: list[tuple[int, tuple[float, float]]]) -> Chains:
+    """Return where points of components are, such as the bases' origins.
+
+    Args:
+        tree: The team.
+        bases: A component, and a point in its frame [m], for each base.
+    """
+    axes, found = 1 + len(tree.joints), []
+    for component, point in bases:
+        turn, offset, links = np.zeros(axes), 0.0, []
+        turn[0] = 1.0
+        for index in reversed(tree.ancestors[component][:-1]):
+            joint = tree.components[index].joint
+            assert joint is not None  # as in every component but the object's
+            arm = np.array([joint.X_PJ.x, joint.X_PJ.y])
+            links.append((turn.copy(), offset, arm, -1, np.zeros(2)))
+            offset += joint.X_PJ.angle
+            if joint.kind == "revolute":
+                turn[1 + joint.index] += joint.sign
+            else:
+                links.append((turn.copy(), offset, np.zeros(2), 1 + joint.index, np.array(joint.axis)))
+        links.append((turn.copy(), offset, np.array(point), -1, np.zeros(2)))
+        found.append(links)
+    count = max((len(links) for links in found), default=1)
+    chains = Chains(
+        np.zeros((len(found), count, axes)), np.zeros((len(found), count)), np.zeros((len(found), count, 2)),
+        np.full((len(found), count), -1), np.zeros((len(found), count, 2)),
+        np.array([len(links) for links in found]),
+    )  # fmt: skip
+    for base, links in enumerate(found):
+        for k, (turn, offset, arm, slide, direction) in enumerate(links):
+            chains.turns[base, k], chains.offsets[base, k], chains.arms[base, k] = turn, offset, arm
+            chains.slides[base, k], chains.directions[base, k] = slide, direction
+    return chains
+
+
+def base_places(chains: Chains, motion: FloatArray) -> FloatArray:
+    """Return the positions and angles of all bases, shape (bases, samples, 3) [m, rad].
+
+    Args:
+        chains: The bases.
+        motion: Configurations, shape (samples, 3 + n).
+    """
+    found, axes = np.zeros((len(chains.links), len(motion), 3)), motion[:, 2:]
+    for base, links in enumerate(chains.links):
+        found[base, :, :2] = motion[:, :2]
+        for k in range(links):
+            angle = chains.offsets[base, k] + axes @ chains.turns[base, k]
+            slide = chains.slides[base, k]
+            length = axes[:, slide] if slide >= 0 else np.zeros(len(motion))
+            x, y = (chains.arms[base, k, :, None] + chains.directions[base, k, :, None] * length).tolist()
+            c, s = np.cos(angle), np.sin(angle)
+            found[base, :, 0] += c * x - s * y
+            found[base, :, 1] += s * x + c * y
+            found[base, :, 2] = angle
+    return found
+
+
+# What moves: the object (point 0), the bases, their angles, and the joints, with derivatives.
+
+
+@compiled(borrows=True)
+def follow(
+    chains: Chains, point: int, x: FloatArray, v: FloatArray, a: FloatArray, moved: FloatArray,
+    by: FloatArray,
+) -> int:  # fmt: skip
+    """Write velocity and acceleration of a point, and their derivatives by z, z' and z''.
+
+    Args:
+        chains: The bases.
+        point: 0 for the object, then the bases, the bases' angles and the joints.
+        x: z, shape (3 + n,).
+        v: z'.
+        a: z''.
+        moved: Receives V and A, shape (2, 2); of one that is a number its first entry counts.
+        by: Receives dV/dz, dV/dz' (which is dA/dz''), dA/dz and dA/dz', shape (4, 2, 3 + n).
+
+    Returns:
+        Of how many numbers V and A consist.
+    """
+    bases, d = chains.links.size, x.size
+    for i in range(4):
+        for j in range(2):
+            for k in range(d):
+                by[i, j, k] = 0.0
+    if point > 2 * bases:
+        axis = point - 2 * bases + 2
+        moved[0, 0], moved[1, 0], by[1, 0, axis] = v[axis], a[axis], 1.0
+        return 1
+    if point > bases:
+        base = point - bases - 1
+        last = chains.links[base] - 1
+        moved[0, 0] = moved[1, 0] = 0.0
+        for k in range(2, d):
+            turn = chains.turns[base, last, k - 2]
+            moved[0, 0] += turn * v[k]
+            moved[1, 0] += turn * a[k]
+            by[1, 0, k] = turn
+        return 1
+    for i in range(2):
+        moved[0, i], moved[1, i], by[1, i, i] = v[i], a[i], 1.0
+    if point == 0:
+        return 2
+    base = point - 1
+    for link in range(chains.links[base]):
+        phi, w, turning = chains.offsets[base, link], 0.0, 0.0
+        for k in range(2, d):
+            turn = chains.turns[base, link, k - 2]
+            phi += turn * x[k]
+            w += turn * v[k]
+            turning += turn * a[k]
+        c, s, slide = cos(phi), sin(phi), chains.slides[base, link] + 2
+        dx, dy = chains.directions[base, link, 0], chains.directions[base, link, 1]
+        dx, dy = c * dx - s * dy, s * dx + c * dy
+        length, rate, push = (x[slide], v[slide], a[slide]) if slide >= 2 else (0.0, 0.0, 0.0)
+        ax, ay = chains.arms[base, link, 0], chains.arms[base, link, 1]
+        ux, uy = c * ax - s * ay + length * dx, s * ax + c * ay + length * dy
+        # The arm u, its direction d of sliding, and both turned by a right angle: (-uy, ux), (-dy, dx).
+        moved[0, 0] += -w * uy + rate * dx
+        moved[0, 1] += w * ux + rate * dy
+        moved[1, 0] += -turning * uy - w * w * ux - 2.0 * w * rate * dy + push * dx
+        moved[1, 1] += turning * ux - w * w * uy + 2.0 * w * rate * dx + push * dy
+        for k in range(2, d):
+            turn = chains.turns[base, link, k - 2]
+            if turn != 0.0:
+                by[0, 0, k] += turn * (-w * ux - rate * dy)
+                by[0, 1, k] += turn * (-w * uy + rate * dx)
+                by[1, 0, k] -= turn * uy
+                by[1, 1, k] += turn * ux
+                by[2, 0, k] += turn * (-turning * ux + w * w * uy - 2.0 * w * rate * dx - push * dy)
+                by[2, 1, k] += turn * (-turning * uy - w * w * ux - 2.0 * w * rate * dy + push * dx)
+                by[3, 0, k] += turn * (-2.0 * w * ux - 2.0 * rate * dy)
+                by[3, 1, k] += turn * (-2.0 * w * uy + 2.0 * rate * dx)
+        if slide >= 2:
+            by[0, 0, slide] -= w * dy
+            by[0, 1, slide] += w * dx
+            by[1, 0, slide] += dx
+            by[1, 1, slide] += dy
+            by[2, 0, slide] += -turning * dy - w * w * dx
+            by[2, 1, slide] += turning * dx - w * w * dy
+            by[3, 0, slide] -= 2.0 * w * dy
+            by[3, 1, slide] += 2.0 * w * dx
+    return 2
+
+
+CHECKS = 8
+"""Parts of a span at whose ends limits are checked when a motion is made [-]."""
+
+
+@compiled
+def largest_shares(
+    points: FloatArray, period: float, chains: Chains, limits: FloatArray, kappa: FloatArray,
+    ranges: FloatArray,
+) -> tuple[float, float, float]:  # fmt: skip
+    """Return the largest shares of the limits of speed, acceleration and jerk, braking included [-].
+
+    They are those at ``CHECKS`` places of every span; of jerk, the differences of accelerations at knots.
+
+    Args:
+        points: Control points of a spline of the time with equal spans, shape (m, 3 + n).
+        period: Time of a span [s].
+        chains: The bases.
+        limits: See ``motion_limits``.
+        kappa: Largest -rho' for every cell, shape (cells,) [1/s].
+        ranges: When a stop with it may begin, and when it has ended, shape (cells, 2) [s].
+    """
+    m, d = points.shape
+    fastest, hardest, roughest = 0.0, 0.0, 0.0
+    x, v, a = np.empty(d), np.empty(d), np.empty(d)
+    moved, by, before = np.empty((2, 2)), np.empty((4, 2, d)), np.zeros((len(limits), 2))
+    for span in range(m - 3):
+        for check in range(CHECKS + 1):
+            u = check / CHECKS
+            w = 1.0 - u
+            for k in range(d):
+                p0, p1, p2, p3 = (
+                    points[span, k],
+                    points[span + 1, k],
+                    points[span + 2, k],
+                    points[span + 3, k],
+                )
+                x[k] = (w**3 * p0 + (3 * u**3 - 6 * u * u + 4) * p1) / 6.0
+                x[k] += ((3 * w**3 - 6 * w * w + 4) * p2 + u**3 * p3) / 6.0
+                v[k] = 0.5 * (w * w * (p1 - p0) + u * u * (p3 - p2)) + (0.5 + u * w) * (p2 - p1)
+                a[k] = (w * (p0 - 2.0 * p1 + p2) + u * (p1 - 2.0 * p2 + p3)) / (period * period)
+                v[k] /= period
+            time = (span + u) * period
+            for point in range(len(limits)):
+                size = follow(chains, point, x, v, a, moved, by)
+                speed = np.sqrt((moved[0, :size] ** 2).sum())
+                fastest = max(fastest, speed / limits[point, 0])
+                hardest = max(hardest, np.sqrt((moved[1, :size] ** 2).sum()) / limits[point, 1])
+                for cell in range(len(ranges)):
+                    if ranges[cell, 0] <= time <= ranges[cell, 1]:
+                        both = np.sqrt(((moved[1, :size] - kappa[cell] * moved[0, :size]) ** 2).sum())
+                        hardest = max(hardest, max(both, kappa[cell] * speed) / limits[point, 1])
+                if check == CHECKS or span + check == 0:
+                    change = np.sqrt(((moved[1, :size] - before[point, :size]) ** 2).sum())
+                    if check == CHECKS:
+                        roughest = max(roughest, change / period / limits[point, 2])
+                    before[point, :size] = moved[1, :size]
+    return fastest, hardest, roughest

@@ -1,0 +1,135 @@
+"""The quickest motion through cells: inside them, within limits, smooth, and stoppable at every moment."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import shapely
+from scipy.interpolate import BSpline
+
+from coop_drake.planning.motion import BRAKE_RAMP, WAITING
+from coop_drake.planning.motion_limits import base_chains, base_places, follow, motion_limits
+from coop_drake.tree.arrays import FloatArray
+from tests.support.motions import planned_motion
+
+
+class Case:
+    """A shipped scenario with its plan, limits as people have them, and the motion."""
+
+    def __init__(self, name: str) -> None:
+        self.plan, self.problem = planned_motion(name)
+        of = self.problem.limits
+        self.bases = list(zip(of.base_components, of.base_points, strict=True))
+        self.limits = motion_limits(of)
+        assert self.plan.motion is not None
+        self.motion = self.plan.motion
+        # scipy's splines are another implementation than the one that is tested.
+        knots = self.motion.period * (np.arange(len(self.motion.points) + 4) - 3.0)
+        self.spline = BSpline(knots, self.motion.points, 3)
+
+    def used(self, seconds: FloatArray, way: FloatArray) -> tuple[float, float, float]:
+        """Return the largest shares of the limits of speed, acceleration and jerk by differences."""
+        bases = base_places(base_chains(self.problem.tree, self.bases), way)
+        places = np.concatenate([way[None, :, :2], bases[..., :2]])
+        angles = np.concatenate([bases[..., 2], way[:, 3:].T])[..., None]
+        step, shares = seconds[1] - seconds[0], []
+        for order in range(3):
+            of = [np.hypot(*np.diff(p, order + 1, axis=0).T) for p in places]
+            of += [np.abs(np.diff(a, order + 1, axis=0)) for a in angles]
+            limits = self.limits[:, order]
+            shares.append(
+                max(float(x.max()) / step ** (order + 1) / y for x, y in zip(of, limits, strict=True))
+            )
+        return shares[0], shares[1], shares[2]
+
+
+@pytest.fixture(scope="module", params=["base", "elbow"])
+def case(request: pytest.FixtureRequest) -> Case:
+    return Case(request.param)
+
+
+def test_it_begins_and_ends_at_rest(case: Case) -> None:
+    ends = [0.0, case.motion.duration]
+    np.testing.assert_allclose(case.spline(ends[0]), case.plan.start, atol=1e-12)
+    np.testing.assert_allclose(case.spline(ends[1])[:3], case.plan.goal_pose, atol=1e-12)
+    np.testing.assert_allclose(case.spline(ends, 1), 0.0, atol=1e-12)
+    np.testing.assert_allclose(case.spline(ends, 2), 0.0, atol=1e-9)
+
+
+def test_it_lies_in_its_cells_which_follow_each_other(case: Case) -> None:
+    windows = case.motion.windows
+    for (begin, end), cell in zip(windows, case.plan.cells, strict=True):
+        part = case.spline(np.linspace(begin, end, 400))
+        assert (part[:, 2:] >= cell.lower).all()
+        assert (part[:, 2:] <= cell.upper).all()
+        assert shapely.covers(cell.tidied, shapely.points(part[:, :2])).all()
+    assert windows[0, 0] == 0.0
+    assert windows[-1, 1] == pytest.approx(case.motion.duration, abs=1e-12)
+    assert (np.diff(windows[:, 0]) > 0.0).all()
+    assert (windows[1:, 0] < windows[:-1, 1]).all()
+
+
+def test_all_limits_are_kept_and_used(case: Case) -> None:
+    seconds = np.linspace(0.0, case.motion.duration, 20001)
+    for share in case.used(seconds, case.spline(seconds)):
+        assert 0.9 < share <= 1.0
+
+
+def test_it_is_quicker_than_cells_that_end_at_rest(case: Case) -> None:
+    assert case.motion.duration < 0.6 * sum(each.estimated_time for each in case.plan.transitions)
+
+
+def test_the_team_can_brake_at_any_time_before_it_leaves_the_cell_it_may_enter(case: Case) -> None:
+    """Braking at beta_i stops before x_i; and at other times with the rate that holds there."""
+    motion = case.motion
+    latest = motion.windows[:-1, 0] + WAITING
+    random = np.random.default_rng(0)
+    for index in random.permutation(len(latest))[:8]:
+        begin = latest[index - 1] if index else 0.0
+        rate = motion.rates[index]
+        for sigma in (latest[index], random.uniform(begin, latest[index])):
+            # rho' falls to -kappa within r, stays there, and rises to zero within r.
+            level = 1.0 / rate - BRAKE_RAMP
+            times = np.arange(0.0, level + 2.0 * BRAKE_RAMP, 1e-3)
+            corners = np.cumsum([0.0, BRAKE_RAMP, max(level, 0.0), BRAKE_RAMP])
+            slowing = np.interp(times, corners, [0.0, -rate, -rate, 0.0])
+            pace = 1.0 + np.append(0.0, np.cumsum(0.5 * (slowing[1:] + slowing[:-1]) * 1e-3))
+            phase = sigma + np.append(0.0, np.cumsum(0.5 * (pace[1:] + pace[:-1]) * 1e-3))
+            assert abs(pace[-1]) < 0.02
+            assert phase[-1] <= motion.windows[index, 1] + 1e-3
+            fast, hard, _ = case.used(times, case.spline(np.minimum(phase, motion.duration)))
+            assert fast <= 1.0
+            assert hard <= 1.0 + 5e-3
+
+
+def test_velocities_and_accelerations_are_derivatives_of_positions(case: Case) -> None:
+    """The bases', and what they are by z, z' and z'': by differences of an analytic motion."""
+    chains = base_chains(case.problem.tree, case.bases)
+    chains = chains._replace(slides=chains.slides.copy(), directions=chains.directions.copy())
+    chains.slides[0, 1], chains.directions[0, 1] = 1, (0.6, 0.8)  # an arm that slides
+    random, d = np.random.default_rng(1), len(case.plan.start)
+    x, v, a = random.normal(size=(3, d))
+    times = np.array([-1e-4, 0.0, 1e-4])[:, None]
+    places = base_places(chains, x + v * times + 0.5 * a * times**2)
+    moved, by = np.zeros((2, 2)), np.zeros((4, 2, d))
+
+    def both(x: FloatArray, v: FloatArray, a: FloatArray, point: int) -> FloatArray:
+        found = np.zeros((2, 2))
+        follow(chains, point, x, v, a, found, np.zeros((4, 2, d)))
+        return found
+
+    for point in range(1 + 2 * len(case.bases) + d - 3):
+        size = follow(chains, point, x, v, a, moved, by)
+        if 1 <= point <= len(case.bases):
+            way = places[point - 1, :, :2]
+            np.testing.assert_allclose(moved[0], (way[2] - way[0]) / 2e-4, rtol=1e-5, atol=1e-6)
+            np.testing.assert_allclose(
+                moved[1], (way[2] - 2.0 * way[1] + way[0]) / 1e-8, rtol=1e-4, atol=1e-5
+            )
+        for k, unit in enumerate(1e-6 * np.eye(d)):
+            by_x = (both(x + unit, v, a, point) - both(x - unit, v, a, point)) / 2e-6
+            by_v = (both(x, v + unit, a, point) - both(x, v - unit, a, point)) / 2e-6
+            by_a = (both(x, v, a + unit, point) - both(x, v, a - unit, point)) / 2e-6
+            expected = np.stack([by_x[0], by_v[0], by_x[1], by_v[1]])
+            np.testing.assert_allclose(by[:, :size, k], expected[:, :size], rtol=1e-5, atol=1e-6)
+            np.testing.assert_allclose(by_a[1, :size], by[1, :size, k], rtol=1e-5, atol=1e-6)
