@@ -160,7 +160,9 @@ def plan_facts(plan: Plan) -> dict[str, Any]:
         **budgeted,
         "cells": len(plan.cells),
         "narrowest_neck_m": min(transition.neck for transition in plan.transitions),
-        "estimated_seconds": sum(transition.estimated_time for transition in plan.transitions),
+        "estimated_seconds": plan.motion.duration
+        if plan.motion
+        else sum(transition.estimated_time for transition in plan.transitions),
         "gains": plan.gain_set,
     }
 

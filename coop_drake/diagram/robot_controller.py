@@ -116,9 +116,12 @@ def robot_knowledge(
         team: The simulated team.
 
     Raises:
-        PlanError: The plan belongs to another team, or the number of maps is not the number of cells.
+        PlanError: The plan belongs to another team, its motion is for an ideal one, or the number of maps is
+            not the number of cells.
     """
     _check(plan, maps, team)
+    if plan.motion is not None and not (scenario.deployment.ideal and scenario.control.hold is None):
+        raise PlanError("the plan's motion is for an ideal team that is not held: plan with hand_over: rest")
     cells = governed_cells(plan, maps)
     factor, deployment, control = 1.0 + scenario.deployment.mass_error, scenario.deployment, scenario.control
     hold = hold_of(scenario, plan)
@@ -356,7 +359,7 @@ def build_robot_controller(knowledge: RobotKnowledge, replacements: Replacements
         for block in blocks.values()
         for port in (block.get_output_port(i) for i in range(block.num_output_ports()))
     }
-    if knowledge.motion is None:
+    if knowledge.motion is None and knowledge.plan.motion is None:
         halves = builder.AddNamedSystem("governor_rate", Demultiplexer([2, 2]))
         builder.Connect(outputs["governor_command"], halves.get_input_port())
         start, rate = knowledge.plan.start[:2], halves.get_output_port(0)
@@ -378,16 +381,41 @@ def _blocks(knowledge: RobotKnowledge) -> dict[str, LeafSystem]:
     joints = range(knowledge.joints.start, knowledge.joints.stop)
     axes = [0, *(1 + i for i in joints)]
     laws, paced = systems.axis_laws(plan, axes), knowledge.hold is not None
+    judged = (
+        cells,
+        laws,
+        [transition.inradius for transition in plan.transitions],
+        plan.goal_pose[:2],
+        knowledge.position_tolerance,
+    )
+    measured = knowledge.period is not None
+    led: dict[str, LeafSystem]
+    if plan.motion is not None:
+        led = {
+            "motion_governor": systems.MotionGovernor(plan.motion, cells),
+            "motion_axes": systems.MotionAxes(plan.motion, laws, [2 + axis for axis in axes]),
+            "ready_monitor": systems.PassingMonitor(plan.motion, *judged, measured=measured),
+        }
+    else:
+        led = {
+            **_governor(knowledge, paced=paced),
+            "axis_ppc": systems.AxisPpc(
+                laws,
+                start=plan.start[2:][np.array(axes)],
+                period=knowledge.period,
+                offset=knowledge.sample_offset,
+                paced=paced,
+            ),
+            "ready_monitor": systems.ReadyMonitor(
+                *judged,
+                measured=measured,
+                nominal=knowledge.motion is not None,
+                axes_led=knowledge.axis_motion is not None,
+            ),
+        }
     return {
         "object_estimator": systems.ObjectEstimator(knowledge.robot, p_LE),
-        **_governor(knowledge, paced=paced),
-        "axis_ppc": systems.AxisPpc(
-            laws,
-            start=plan.start[2:][np.array(axes)],
-            period=knowledge.period,
-            offset=knowledge.sample_offset,
-            paced=paced,
-        ),
+        **led,
         "wrench_law": systems.WrenchLaw(
             p_LE,
             p_LLcm=inertia.p_LLcm,
@@ -397,16 +425,6 @@ def _blocks(knowledge: RobotKnowledge) -> dict[str, LeafSystem]:
             joints=len(joints),
         ),
         "robot_effort": systems.RobotEffort(knowledge.robot),
-        "ready_monitor": systems.ReadyMonitor(
-            cells,
-            laws,
-            [transition.inradius for transition in plan.transitions],
-            plan.goal_pose[:2],
-            knowledge.position_tolerance,
-            nominal=knowledge.motion is not None,
-            measured=knowledge.period is not None,
-            axes_led=knowledge.axis_motion is not None,
-        ),
         **_additions(knowledge, laws),
     }
 

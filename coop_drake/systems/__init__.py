@@ -26,6 +26,7 @@ from coop_drake.systems.measurements import (
 )
 from coop_drake.systems.messages import Exchange, Interruption, MessageChannel, TeamLink
 from coop_drake.systems.monitors import ArrivalMonitor, DepartureMonitor, MonitoredRobot
+from coop_drake.systems.motion import MotionAxes, MotionGovernor, PassingMonitor
 from coop_drake.systems.ppc import AxisLaw, AxisMotion, AxisPpc, NominalAxes, axis_laws
 from coop_drake.systems.readiness import CellPlanner, ReadyMonitor
 
@@ -56,10 +57,13 @@ __all__ = [
     "MeasurementNoise",
     "MessageChannel",
     "MonitoredRobot",
+    "MotionAxes",
+    "MotionGovernor",
     "NominalAxes",
     "NominalGovernor",
     "NominalMotion",
     "ObjectEstimator",
+    "PassingMonitor",
     "Pushes",
     "ReadyMonitor",
     "ReferenceGovernor",

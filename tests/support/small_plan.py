@@ -8,6 +8,7 @@ from math import cos, pi, sin, sqrt
 import numpy as np
 from shapely import Point, Polygon, box
 
+from coop_drake.answers.motion import Motion
 from coop_drake.answers.plan import Cell, Plan, Transition
 from coop_drake.laws import GainSet, ScheduledGains, transition_gains
 
@@ -143,3 +144,10 @@ def _transition(
         gains=gains,
         path=np.array([position, target]),
     )
+
+
+def with_motion(plan: Plan) -> Plan:
+    """The plan with a motion by hand that waits at its start: for tests of blocks, which no cell judges."""
+    still, cells = np.tile(plan.start, (7, 1)), len(plan.cells)
+    windows = np.stack([np.linspace(0.0, 3.0, cells), np.linspace(1.0, 4.0, cells)], axis=1)
+    return replace(plan, motion=Motion(still, 1.0, windows, np.zeros(cells), 0.1, 0.1, 100.0, 20.0))

@@ -43,6 +43,7 @@ from coop_drake.scenario import (
 from coop_drake.simulation import build_maps
 from tests.support.robot_matrices import turned
 from tests.support.small_loop import small_maps, small_problem
+from tests.support.small_plan import with_motion
 from tests.support.small_scenario import small_scenario
 from tests.support.system_checks import SIZE_OF_ABSTRACT, evaluate, port_sizes, state_of
 from tests.support.tubes import WITH_AXES, tubed_problem
@@ -93,6 +94,9 @@ def blocks():
         for leaf in leaves(loop.diagram):
             found.setdefault(type(leaf).__name__, (leaf, loop))
     scenario, plan = own
+    loop = build_closed_loop(scenario, with_motion(plan), small_maps())
+    for leaf in leaves(loop.diagram):
+        found.setdefault(type(leaf).__name__, (leaf, loop))
     world = build_world(replace(scenario, deployment=EVERYTHING), plan, DirectExchange())
     found["TeamLink"] = world.link, world
     return found
