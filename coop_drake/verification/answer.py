@@ -24,6 +24,7 @@ from coop_drake.verification.budget import check_budget, check_efforts, check_po
 from coop_drake.verification.budget_origin import ScenarioBudgets, check_origin
 from coop_drake.verification.checks import Check, Verified
 from coop_drake.verification.gains import check_accelerations, check_gains, check_limits, check_speeds
+from coop_drake.verification.motion import check_motion
 from coop_drake.verification.question import question_of
 
 SAME_ANGLE = 1e-9
@@ -98,6 +99,7 @@ def verify_plan(
     exact = _exactly(problem, plan_document(plan), progress)
     checks = [same, *exact, check_gains(plan, gain_sets)]
     kept = check_limits(plan, problem, gain_sets[plan.gain_set])
+    kept += check_motion(plan, problem, gain_sets[plan.gain_set])
     if plan.refused_by:
         return _verified_way(plan, (*checks, *_of_way(plan, problem), *kept))
     origin = None if plan.budget is None else Check("the budget is compared with no scenario", 0)
@@ -116,9 +118,19 @@ def verify_plan(
         "found",
         f"plan of {len(plan.cells)} cells{whose}",
         tuple(checks),
-        "no body touches a wall or another body in any state of the cells, which lead from start to goal",
+        f"no body touches a wall or another body in any state of the cells, {_proved_of_motion(plan)}",
         f"{_unproved_of_control(plan)}; that it takes as long as is estimated; that the robots are as in "
         "their models",
+    )
+
+
+def _proved_of_motion(plan: Plan) -> str:
+    """What a plan's checks prove of how the cells lead from start to goal."""
+    if plan.motion is None:
+        return "which lead from start to goal"
+    return (
+        "in which the motion leads from start to goal; it keeps the limits of speed and acceleration, also "
+        "while it brakes, and can stop before it leaves a cell"
     )
 
 
@@ -154,6 +166,11 @@ def _verified_way(plan: Plan, checks: tuple[Check, ...]) -> Verified:
 
 def _unproved_of_control(plan: Plan) -> str:
     """What a plan's checks leave open of whether a team stays in its cells."""
+    if plan.motion is not None:
+        return (
+            "that a team follows the motion, and brakes where it should; what it asks of motors; limits of "
+            "jerk while it brakes, and all limits where it goes on after a stop"
+        )
     if plan.budget is None:
         return "that a team stays in the cells (verify the log of its run, or plan with --budget)"
     if plan.budget.axes:

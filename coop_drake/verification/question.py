@@ -23,6 +23,7 @@ TRUSTED = (
     "how a budget follows from the section deployment and the models (coop_drake/scenario, coop_drake/plant)",
     "the bounds of what departs under a budget, which the planner uses too (coop_drake/robustness)",
     "the rule by which a plan's gains follow from its cells, which the planner uses too (coop_drake/laws)",
+    "the check of a plan's motion, in floating point (coop_drake/verification/motion.py, shapely)",
     "the simulation that estimates times, for limits that refuse a way (coop_drake/planning/duration.py)",
     "Python's integers, and the checker (coop_drake/checking)",
 )

@@ -34,6 +34,7 @@ from coop_drake.verification import verify_plan
 from coop_drake.verification.budget_origin import check_origin
 from coop_drake.verification.gains import check_ages
 from tests.support.certificates import GAINS, room_with_pillar
+from tests.support.motions import planned_motion
 from tests.support.scenarios import MODELS
 from tests.support.small_scenario import small_scenario
 
@@ -146,6 +147,10 @@ FREE = {
     "restart.rest_rate": Free("at least what counts as rest, and so small that the tube holds", (0.5, 50.0)),
     "restart.wait": Free("at least as long as the loops' responses are", (0.5,)),
     "restart.departures[][]": Free(SAFE, (0.9,)),
+    "motion": Free("may be left out: then the team comes to rest in every cell"),
+    "motion.rates[]": Free("at least what a stop needs, and within limits", (0.99, -1.0, 100.0)),
+    "motion.waiting": Free("so that every stop ends before its cell is left", (0.0, 1.1, 10.0)),
+    "motion.ramp": Free("likewise", (0.0, 1.1, 100.0)),
 }
 """All that may be altered in a plan without making a statement false."""
 
@@ -321,6 +326,16 @@ def test_every_entry_of_a_plan_with_limits_of_acceleration_is_compared_or_a_free
     check_kinds(limited(), slice(None))
 
 
+def passed():
+    """A plan of a team that passes from cell to cell."""
+    plan, problem = planned_motion("base")
+    return Case(as_written(plan), problem, GAINS, None)
+
+
+def test_every_entry_of_a_motion_is_compared_or_a_free_choice():
+    check_kinds(passed(), slice(None), "motion")
+
+
 def fields_of(kind, way=""):
     """The places of all fields of a class of typed data in its document."""
     origin, parts = get_origin(kind), get_args(kind)
@@ -338,16 +353,16 @@ def fields_of(kind, way=""):
 @pytest.mark.slow
 def test_every_field_of_a_plan_is_altered_in_one_of_these_tests_and_no_free_choice_is_of_none():
     shipped = {kind for name in SCENARIOS for kind in places(case(name, True).document)}
-    assert set(FREE) <= shipped
-    kinds = shipped | set(places(limited().document))
+    kinds = shipped | set(places(limited().document)) | set(places(passed().document))
+    assert set(FREE) <= kinds
     refused_by = {place for place in fields_of(Plan) if place.startswith("refused_by[]")}  # of ways, above
     missing = set(fields_of(Plan)) - kinds - refused_by
     assert not missing, f"no test alters {sorted(missing)}: add a case whose plan has these entries"
 
 
-def check_kinds(one, some):
+def check_kinds(one, some, of=""):
     assert refusal(one.document, one) is None
-    kinds = places(one.document)
+    kinds = {kind: ways for kind, ways in places(one.document).items() if kind.startswith(of)}
     for kind in sorted(kinds)[some]:
         if kind in FREE:
             check_beyond(one, kind, kinds[kind])

@@ -339,7 +339,7 @@ def check_reports(rows: Rows, problem: PlanningProblem) -> Check:
             of_object[members], of_axes[members], change = _leaving(rows, members, k)
             tolerances[members] += change
         else:
-            of_object[members], of_axes[members] = _arriving(rows, members, problem.position_tolerance)
+            of_object[members], of_axes[members] = arriving(rows, members, problem.position_tolerance)
     joints = problem.tree.joints
     own = [[0, *[1 + j.index for j in joints if j.robot == k]] for k in range(len(log.robot_names))]
     of_robots = np.column_stack([of_axes[:, axes].min(axis=1) for axes in own])
@@ -393,7 +393,7 @@ def rest_shares(plan: Plan, cell: int, axes: FloatArray, rates: FloatArray) -> F
     return shares
 
 
-def _arriving(rows: Rows, members: NDArray[np.bool_], tolerance: float) -> tuple[FloatArray, FloatArray]:
+def arriving(rows: Rows, members: NDArray[np.bool_], tolerance: float) -> tuple[FloatArray, FloatArray]:
     """Margins of object (m,) and axes (m, 1 + n) in the last cell."""
     distance = np.hypot(*(rows.z[members, :2] - rows.plan.goal_pose[:2]).T)
     speed = np.hypot(*rows.rates[members, :2].T)
@@ -434,7 +434,7 @@ def _energy_margin(rows: Rows, members: NDArray[np.bool_], cell: int, times: Flo
     return margin
 
 
-def check_handovers(rows: Rows, *, exact: bool) -> tuple[Check, Check]:
+def check_handovers(rows: Rows, *, exact: bool) -> list[Check]:
     """Check order and times of the cells, and the reports with which each was left.
 
     An ideal team leaves a cell in the first row in which all robots are ready, unless it is held. Otherwise
@@ -463,16 +463,13 @@ def check_handovers(rows: Rows, *, exact: bool) -> tuple[Check, Check]:
             where = f"ready_margins[{members[-1]}, {robot}]"
             text = f"and all before in cell {k} are negative, but the cell is left"
             raise RefusalError(where, f"at t = {log.times[members[-1]]:.6g} s: {text}")
-    shares = [float(_share(rows, k, i).max()) for k, i in enumerate(rows.entries, 1)]
-    used = "share of the energy, or of the departure from rest, that the axes may have when a cell is entered"
-    return (
-        Check(
-            "cells were entered one by one, each when all robots were ready",
-            len(shares),
-            arrays=("cell_index", "transition_start"),
-        ),
-        Check(used, len(shares), max(shares, default=None), "of the bound, largest"),
-    )
+    name = "cells were entered one by one, each when all robots were ready"
+    checks = [Check(name, len(rows.entries), arrays=("cell_index", "transition_start"))]
+    if plan.motion is None:
+        shares = [float(_share(rows, k, i).max()) for k, i in enumerate(rows.entries, 1)]
+        used = "share of the energy, or of the departure from rest, that axes may have when a cell is entered"
+        checks.append(Check(used, len(shares), max(shares, default=None), "of the bound, largest"))
+    return checks
 
 
 def _share(rows: Rows, cell: int, row: int) -> FloatArray:

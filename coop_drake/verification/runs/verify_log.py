@@ -43,6 +43,7 @@ from coop_drake.verification.runs.laws import (
     check_reports,
     check_stated_funnels,
 )
+from coop_drake.verification.runs.motion import check_followed
 from coop_drake.verification.runs.rows import Between, Rows, RunSetup, check_complete, check_motion
 
 SAME = 1e-9
@@ -185,6 +186,12 @@ def _check_laws(rows: Rows, between: Between, problem: PlanningProblem, setup: R
     checks = [*check_cells(rows, between), check_stated_funnels(rows)]
     never_held = not setup.can_be_held and rows.plan.budget is None
     checks.append(check_clock(rows, one_hold=setup.one_hold, never_held=never_held))
+    if rows.plan.motion is not None:
+        return [
+            *checks,
+            *check_followed(rows, problem, exact=setup.exact),
+            *check_handovers(rows, exact=setup.exact),
+        ]
     if setup.one_clock:
         checks += check_funnels(rows, between)
     if setup.exact:
