@@ -21,7 +21,7 @@ from coop_drake.laws import ScheduledGains
 from coop_drake.planning.motion_limits import base_chains, base_places
 from coop_drake.plant.problem import planning_problem
 from coop_drake.verification import verify_file, verify_plan
-from coop_drake.verification.motion import _Mover, check_motion
+from coop_drake.verification.motion import _Mover, _movers, check_motion
 from coop_drake.verification.runs.bodies import component_stages
 from tests.support.cases import team_tree
 from tests.support.certificates import changed, write
@@ -313,6 +313,16 @@ def test_every_limit_counts_as_the_problem_states_it(base, name):
     if of is not None:  # as differences of positions find it
         moved_by = max(np.linalg.norm(np.diff(one, axis=0), axis=1).max() for one in of)
         assert high == pytest.approx(moved_by * 20000 / plan.motion.duration, rel=2e-3)
+
+
+@pytest.mark.parametrize("unknown", [np.empty(0), np.full(2, np.inf)])
+def test_limits_that_nobody_states_are_those_by_default(base, unknown):
+    _, problem = base
+    names = [name for name in LARGEST if name != "object_acceleration"]
+    of = replace(problem.limits, **dict.fromkeys(names, unknown), object_acceleration=unknown[:1])
+    found = [(one.speed, one.acceleration, one.jerk) for one in _movers(replace(problem, limits=of))]
+    bases, joints = [(1.0, 1.0, 10.0), (1.5, 2.0, np.inf)] * 2, [(1.0, 2.0, np.inf)] * 2
+    assert found == [(np.inf, 1.5, np.inf), *bases, *joints]
 
 
 STEPS = (0.0, 0.1, 0.2, 0.3, 0.39, 0.4, 0.392, 0.3, 0.2, 0.1, 0.0)
