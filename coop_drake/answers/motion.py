@@ -20,6 +20,10 @@ BASE_SPEED, TURN_RATE, BASE_ACCELERATION, TURN_ACCELERATION, BASE_JERK = 1.0, 1.
 JOINT_RATE, JOINT_ACCELERATION, OBJECT_ACCELERATION = 1.0, 2.0, 1.5
 """Limits of joints and of the object of which nothing is known [rad/s, rad/s^2; m/s, m/s^2; m/s^2]."""
 
+WAITING = 0.128
+"""2 W for words that are up to 50 ms old, clocks that are 2 ms off and a control period of 5 ms [s]:
+W = 50 ms + 2 * 2 ms + 2 * 5 ms."""
+
 LARGEST_DAMPING, AGE_PHASE = 20.0, 0.4
 """zeta_t is no larger [1/s], and no larger than this phase over the age of the commands [rad]; the pull is
 critically damped."""
@@ -44,9 +48,9 @@ class Motion:
     (p_k + 4 p_(k+1) + p_(k+2)) / 6, its velocity (p_(k+2) - p_k) / (2 h), and its acceleration
     (p_k - 2 p_(k+1) + p_(k+2)) / h^2, which is linear between knots.
 
-    A robot begins cell i at the time tau_i at which the motion enters it, and says so. Who has not heard that
-    all have begun cell i by tau_i + 2 W brakes there, and everybody does. Braking, the pace falls from 1 at
-    the rate kappa_i, reached within r, and comes to rest before the motion leaves cell i.
+    It is made so that robots can tell each other that they have begun cell i at the time tau_i, at which the
+    motion enters it, and that all can brake at tau_i + 2 W if somebody has not heard it of all: the pace
+    falls from 1 at the rate kappa_i, reached within r, and they rest before the motion leaves cell i.
 
     Attributes:
         points: Control points z = (x, y, theta, q...), the first three equal, the last three equal, shape

@@ -157,7 +157,8 @@ def _record(
     with reporter.stage("recording", "drawing"):
         drawing.wait("recording")
     reporter.table(task.name, summary_rows(reporter.facts, verbose=reporter.verbose))
-    _warn_of_unknown_limits(reporter)
+    if task.scenario.planner.hand_over == "rest":  # Else there are limits by default.
+        _warn_of_unknown_limits(reporter)
     for line in process_lines(reporter.facts):
         reporter.say(line)
     reporter.say(f"The recording is {escape(str(folder.recording))}; open it in a browser")

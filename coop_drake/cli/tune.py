@@ -96,6 +96,8 @@ def tune_command(
     wanted = criteria or ["peak_force"], ["time<=1x"] if limits is None else limits
     weights, kept = read_weights(wanted[0]), tuple(map(Limit.parse, wanted[1]))
     task = read_task(scenario, gains, reporter)
+    if task.scenario.planner.hand_over == "pass":
+        raise typer.BadParameter("tune varies the gains of a team with planner.hand_over: rest.")
     start = task.scenario.gain_sets[task.scenario.selected_gains]
     parameters = tunable_parameters(start, vary or ())
     folder = ResultFolder.of(task.name, out, "plan", "tuning", below=_TUNED)

@@ -308,7 +308,13 @@ def build_closed_loop(
     start = plan.start + displacement(scenario.deployment, len(plan.start))
     builder.AddNamedSystem("transport_station", station.diagram)
     planner = builder.AddNamedSystem(
-        "cell_planner", CellPlanner(len(team.robots), len(plan.cells), period=scenario.deployment.period)
+        "cell_planner",
+        CellPlanner(
+            len(team.robots),
+            len(plan.cells),
+            period=scenario.deployment.period,
+            entries=[] if plan.motion is None else plan.motion.windows[1:, 0].tolist(),
+        ),
     )
     hold, supervisor = hold_of(scenario, plan), None
     if hold is not None:

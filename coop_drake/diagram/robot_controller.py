@@ -116,12 +116,15 @@ def robot_knowledge(
         team: The simulated team.
 
     Raises:
-        PlanError: The plan belongs to another team, its motion is for an ideal one, or the number of maps is
-            not the number of cells.
+        PlanError: The plan belongs to another team, or the number of maps is not the number of cells.
+        ScenarioError: The plan's motion is for an ideal team.
     """
     _check(plan, maps, team)
-    if plan.motion is not None and not (scenario.deployment.ideal and scenario.control.hold is None):
-        raise PlanError("the plan's motion is for an ideal team that is not held: plan with hand_over: rest")
+    if plan.motion is not None and not (scenario.ideal and scenario.control.hold is None):
+        raise ScenarioError(
+            str(scenario.path), "planner.hand_over", "pass",
+            "rest: the plan's motion is for an ideal team that is not held",
+        )  # fmt: skip
     cells = governed_cells(plan, maps)
     factor, deployment, control = 1.0 + scenario.deployment.mass_error, scenario.deployment, scenario.control
     hold = hold_of(scenario, plan)

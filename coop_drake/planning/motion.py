@@ -39,7 +39,7 @@ import scipy.linalg
 import shapely
 from numpy.typing import NDArray
 
-from coop_drake.answers.motion import AGE_PHASE, LARGEST_DAMPING, Motion
+from coop_drake.answers.motion import AGE_PHASE, LARGEST_DAMPING, WAITING, Motion
 from coop_drake.answers.plan import Plan
 from coop_drake.answers.problem import PlanningProblem
 from coop_drake.errors import PlanError
@@ -77,10 +77,6 @@ CLEARANCE_SPANS = 1.0
 SAMPLES = 24
 """Samples of the first way in a cell [-]."""
 
-WAITING = 0.128
-"""2 W for words that are up to 50 ms old, clocks that are 2 ms off and a control period of 5 ms [s]:
-W = 50 ms + 2 * 2 ms + 2 * 5 ms."""
-
 SHORTEST_SPAN = 0.01
 """Shortest time between two control points, while the time is free [s]."""
 
@@ -106,6 +102,9 @@ between its rows, too, that it stayed in the cells."""
 
 LIMIT_SHARE = 0.995
 """Share of every limit that a motion uses [-]: the team departs from it by rounding and integration."""
+
+MUCH_SLOWER = 1.02
+"""Where limits between knots ask for times that are longer by more than this factor, spans are halved [-]."""
 
 FINER = 2
 """How often spans are halved where the motion to begin with does not enter every cell [-]."""
@@ -354,13 +353,16 @@ def quickest_motion(
         equal = uniform_points(program.points, PERIOD / 2**finer)
         try:
             last = _Program(cells, chains, table, waiting, equal, uniform=True)
-            break
         except PlanError:
             if finer == FINER:
                 raise
-    last.solve(UNIFORM_WEIGHTS)
+            continue
+        last.solve(UNIFORM_WEIGHTS)
+        made, slower = last.slowed()
+        if slower < MUCH_SLOWER:
+            break
     damping = min(LARGEST_DAMPING, AGE_PHASE / age) if age > 0.0 else LARGEST_DAMPING
-    return Motion(*last.slowed(), waiting, BRAKE_RAMP, 0.25 * damping * damping, damping)
+    return Motion(*made, waiting, BRAKE_RAMP, 0.25 * damping * damping, damping)
 
 
 def uniform_points(points: FloatArray, period: float) -> FloatArray:
@@ -533,21 +535,20 @@ class _Program:
                 return True
         return -slope < DONE * weight
 
-    def slowed(self) -> tuple[FloatArray, float, FloatArray, FloatArray]:
-        """Return control points, period, windows and rates, slowed as limits between knots ask for."""
+    def slowed(self) -> tuple[tuple[FloatArray, float, FloatArray, FloatArray], float]:
+        """Return control points, period, windows and rates, slowed as limits between knots ask for.
+
+        And by which factor. Slower, the team brakes less quickly, too, so that one factor is enough.
+        """
         points, (period, factor) = self.points[:, :-1].copy(), (self.points[2, -1] - self.points[1, -1], 1.0)
-        for _ in range(2):
-            period *= factor
-            brake(
-                self.points * np.append(np.ones(points.shape[1]), factor),
-                self.windows,
-                self.waiting,
-                self.kappa,
-                self.acting,
-            )
-            windows = period * self.windows
-            begin = np.append(-inf, windows[:-1, 0] + self.waiting)[:-1]
-            ranges = np.stack([begin, windows[:-1, 1]], axis=1)
-            fast, hard, rough = largest_shares(points, period, self.chains, self.limits, self.kappa, ranges)
-            factor = max(fast, hard**0.5, rough ** (1.0 / 3.0), 1.0)
-        return points, float(period), windows, self.kappa.copy()
+        for slower in (True, False):
+            timed = self.points.copy()
+            timed[:, -1] *= factor
+            brake(timed, self.windows, self.waiting, self.kappa, self.acting)
+            windows = factor * period * self.windows
+            if slower:
+                begin = np.append(-inf, windows[:-1, 0] + self.waiting)[:-1]
+                ranges = np.stack([begin, windows[:-1, 1]], axis=1)
+                shares = largest_shares(points, period, self.chains, self.limits, self.kappa, ranges)
+                factor = max(shares[0], shares[1] ** 0.5, shares[2] ** (1.0 / 3.0), 1.0)
+        return (points, float(factor * period), windows, self.kappa.copy()), factor

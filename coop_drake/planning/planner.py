@@ -77,7 +77,8 @@ def plan(
             is finished along the way that is certified by then; without one, the error goes to the caller.
 
     Raises:
-        ValueError: The effort is negative or no number.
+        ValueError: The effort is negative or no number, or the team shall pass from cell to cell under a
+            budget, or with bases that are not known.
 
     Returns:
         Found with the plan, BeyondLimits with a plan that limits refuse, Infeasible or Undecided.
@@ -86,6 +87,8 @@ def plan(
         if not 0.0 <= effort < inf:
             raise ValueError(f"effort is {effort}; allowed are numbers of 0 or more")
         problem = replace(problem, settings=replace(problem.settings, effort=effort))
+    if problem.settings.hand_over == "pass" and (budget is not None or not problem.limits.base_components):
+        raise ValueError("hand_over: pass is for teams whose bases are known, without a budget")
     # Floors are remembered by question, and the caller may change the arrays of a question between two calls.
     problem = replace(problem, start=problem.start.copy(), goal_pose=problem.goal_pose.copy())
     local, near = local_question(problem), None
@@ -115,9 +118,11 @@ def _passing(
         progress("planning the motion through all cells", 0.0)
     try:
         return replace(answer, plan=replace(answer.plan, motion=quickest_motion(answer.plan, problem, age)))
-    except PlanError as error:
+    except (PlanError, np.linalg.LinAlgError) as error:
         return Undecided(
-            f"a plan was found, but no motion that passes its cells without a stop: {error}", answer.report
+            f"no motion was found that passes the cells of a plan without a stop: {error}; "
+            "planner.hand_over: rest gives the plan",
+            answer.report,
         )
 
 

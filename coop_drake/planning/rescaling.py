@@ -205,6 +205,7 @@ def _settings(settings: PlannerSettings, scale: float) -> PlannerSettings:
         margin=margin,
         length_resolution=scale * settings.length_resolution,
         min_clearance=settings.min_clearance,  # It is meant for the usual size.
+        hand_over="rest",  # Its limits have units; boxes are chosen without them.
     )
 
 

@@ -51,8 +51,9 @@ def _setting_faults(scenario: Scenario) -> Faults:
         known = ", ".join(sorted(scenario.gains.sets))
         yield "gains.selected", scenario.gains.selected, f"a gain set, one of {known}"
     if scenario.planner.hand_over == "pass":
-        if not scenario.deployment.ideal or scenario.deployment.budget != "none":
-            yield "planner.hand_over", "pass", "rest where the section deployment is stated"
+        if not scenario.ideal or scenario.deployment.budget != "none":
+            said = "rest where deployment is stated, or grasps are not joints"
+            yield "planner.hand_over", "pass", said
         if scenario.control.hold is not None:
             yield "planner.hand_over", "pass", "rest where control.hold is stated"
     hold = scenario.control.hold
@@ -66,7 +67,7 @@ def _name_faults(scenario: Scenario, robots: Sequence[str]) -> Faults:
         for name in getattr(scenario, section):
             if name not in robots and (section != "limits" or name not in (ALL_ROBOTS, OBJECT)):
                 yield f"{section}.{name}", name, "a robot, one of " + ", ".join(robots)
-    if OBJECT in robots:
+    if OBJECT in robots and OBJECT in scenario.limits:
         yield "robots", OBJECT, f"another name: limits.{OBJECT} has the limits of the object"
     for name, stated in scenario.limits.items():
         if name != OBJECT and stated.acceleration is not None:

@@ -181,6 +181,9 @@ PATIENCE_ALLOWANCE = 20.0
 
 def patience(plan: Plan, cell: int) -> float:
     """Return the longest time that a transition is waited for [s]."""
+    if plan.motion is not None:
+        begin, end = plan.motion.windows[cell].tolist()
+        return float(end - begin) + PATIENCE_ALLOWANCE
     return PATIENCE_FACTOR * plan.transitions[cell].estimated_time + PATIENCE_ALLOWANCE
 
 

@@ -130,7 +130,7 @@ class MotionAxes(_Follower):
 
 
 class PassingMonitor(ReadyMonitor):
-    """Reports that a robot has entered the next cell along the motion; in the last one, that it has arrived.
+    """Reports that it is time to enter the next cell along the motion; in the last one, that all is done.
 
     ======= ======================== ========== ==================================================== =====
     input   ``object_state``         6          pose and twist of L                                  W

@@ -129,8 +129,8 @@ def _proved_of_motion(plan: Plan) -> str:
     if plan.motion is None:
         return "which lead from start to goal"
     return (
-        "in which the motion leads from start to goal; it keeps the limits of speed and acceleration, also "
-        "while it brakes, and can stop before it leaves a cell"
+        "in which the motion leads from start to goal; it keeps the limits of speed and acceleration, stated "
+        "or by default, also while it brakes, and can stop before it leaves a cell"
     )
 
 
@@ -168,8 +168,9 @@ def _unproved_of_control(plan: Plan) -> str:
     """What a plan's checks leave open of whether a team stays in its cells."""
     if plan.motion is not None:
         return (
-            "that a team follows the motion, and brakes where it should; what it asks of motors; limits of "
-            "jerk while it brakes, and all limits where it goes on after a stop"
+            "that a team follows the motion, or brakes (the motion is for an ideal team; the checks of gains "
+            "and estimated times are about one that rests in every cell); what it asks of motors; jerk but "
+            "for its mean over each span; limits where it goes on after a stop"
         )
     if plan.budget is None:
         return "that a team stays in the cells (verify the log of its run, or plan with --budget)"

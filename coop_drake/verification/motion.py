@@ -23,7 +23,7 @@ import shapely
 from numpy.typing import NDArray
 
 from coop_drake.answers import motion as defaults
-from coop_drake.answers.motion import Motion
+from coop_drake.answers.motion import WAITING, Motion
 from coop_drake.answers.plan import Plan
 from coop_drake.answers.problem import PlanningProblem
 from coop_drake.errors import RefusalError
@@ -137,7 +137,7 @@ def _windows(motion: Motion) -> FloatArray:
         if not (tau == 0.0 if i == 0 else before[0] < tau < before[1]):
             allowed = "0 s" if i == 0 else f"a time after {before[0]} and before {before[1]} s"
             raise RefusalError(where, f"begins at {tau} s; expected {allowed}")
-        if not tau < x <= duration * (1.0 + RELATIVE):
+        if not (tau < duration * (1.0 - RELATIVE) and tau < x <= duration * (1.0 + RELATIVE)):
             raise RefusalError(where, f"ends at {x} s; expected a time after {tau} s, up to {duration} s")
         before = tau, x
     if not before[1] >= duration * (1.0 - RELATIVE):
@@ -155,9 +155,10 @@ def _check_stops(motion: Motion) -> Check:
     in t is half of that. Where 1 / kappa is less than r, ramps as steep meet before rho' is -kappa, and the
     stop takes 2 sqrt(r / kappa), which is less.
     """
-    for name, value in (("waiting", motion.waiting), ("ramp", motion.ramp)):
-        if not value > 0.0:
-            raise RefusalError(f"motion.{name}", f"is {value} s; expected a positive time")
+    if not motion.ramp > 0.0:
+        raise RefusalError("motion.ramp", f"is {motion.ramp} s; expected a positive time")
+    if not motion.waiting >= WAITING:
+        raise RefusalError("motion.waiting", f"is {motion.waiting} s; expected {WAITING} s or more")
     last, least = len(motion.rates) - 1, inf
     for i, (tau, x) in enumerate(motion.windows[:last].tolist()):
         left, ramps = x - tau - motion.waiting, 0.5 * motion.ramp

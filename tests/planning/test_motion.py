@@ -7,7 +7,8 @@ import pytest
 import shapely
 from scipy.interpolate import BSpline
 
-from coop_drake.planning.motion import BRAKE_RAMP, WAITING
+from coop_drake.answers.motion import WAITING
+from coop_drake.planning.motion import BRAKE_RAMP
 from coop_drake.planning.motion_limits import base_chains, base_places, follow, motion_limits
 from coop_drake.tree.arrays import FloatArray
 from tests.support.motions import planned_motion

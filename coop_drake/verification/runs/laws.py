@@ -467,7 +467,8 @@ def check_handovers(rows: Rows, *, exact: bool) -> list[Check]:
     checks = [Check(name, len(rows.entries), arrays=("cell_index", "transition_start"))]
     if plan.motion is None:
         shares = [float(_share(rows, k, i).max()) for k, i in enumerate(rows.entries, 1)]
-        used = "share of the energy, or of the departure from rest, that axes may have when a cell is entered"
+        used = "share of the energy, or of the departure from rest, "
+        used += "that the axes may have when a cell is entered"
         checks.append(Check(used, len(shares), max(shares, default=None), "of the bound, largest"))
     return checks
 

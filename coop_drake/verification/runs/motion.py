@@ -7,6 +7,7 @@ from scipy.interpolate import BSpline
 
 from coop_drake.answers.motion import Motion
 from coop_drake.answers.problem import PlanningProblem
+from coop_drake.errors import RefusalError
 from coop_drake.tree.arrays import FloatArray
 from coop_drake.verification.checks import Check
 from coop_drake.verification.runs.laws import DRIVEN, ROUNDING, SAME, STEP, arriving, signed_distances
@@ -41,6 +42,15 @@ def check_followed(rows: Rows, problem: PlanningProblem, *, exact: bool) -> list
     rows.require_same("governor_spread", np.zeros(len(log.times)), SAME)
     arrays = ("governor_position", "governor_spread")
     checks.append(Check("the reference is the plan's motion", log.times.size, largest, "m, largest", arrays))
+    entered, windows = log.times[rows.entries], motion.windows
+    late, left = entered - windows[1:, 0], windows[:-1, 1] - entered
+    for k in np.flatnonzero((late < -SAME) | (left < -SAME)):
+        text = f"is entered at {entered[k]:.9g} s; the motion overlaps it from {windows[k + 1, 0]:.9g} s"
+        raise RefusalError(f"cell_index[{rows.entries[k]}]", f"cell {k + 1} {text} to {windows[k, 1]:.9g} s")
+    name = "cells were entered while the motion lay in both cells"
+    checks.append(
+        Check(name, len(entered), float(left.min(initial=np.inf)), "s before the older one is left, least")
+    )
     away = float(np.hypot(*(rows.z[:, :2] - nominal[:, :2]).T).max())
     turned = float(np.abs(rows.z[:, 2:] - nominal[:, 2:]).max())
     checks.append(Check("largest departure of the object from the motion", log.times.size, away, "m"))
@@ -65,13 +75,13 @@ def _at(motion: Motion, times: FloatArray) -> tuple[FloatArray, FloatArray, Floa
 def _check_law(
     rows: Rows, motion: Motion, nominal: FloatArray, velocity: FloatArray, acceleration: FloatArray
 ) -> Check:
-    """Check that the object is accelerated along the motion, and pulled to it."""
+    """Check that position, angle and joints are accelerated along the motion, and pulled to it."""
     off, fast = rows.z - nominal, rows.rates - velocity
-    expected = (acceleration - motion.stiffness * off - motion.damping * fast)[:, :3]
-    difference = np.abs(rows.log.accelerations[:, :3] - expected)
+    expected = acceleration - motion.stiffness * off - motion.damping * fast
+    difference = np.abs(rows.log.accelerations - expected)
     text = "the motion asks for {:.9g}, and the acceleration is {:.9g}"
-    rows.require(difference <= DRIVEN, "accelerations", text, expected, rows.log.accelerations[:, :3])
-    name = "the object was accelerated as the motion asks for"
+    rows.require(difference <= DRIVEN, "accelerations", text, expected, rows.log.accelerations)
+    name = "all axes were accelerated as the motion asks for"
     return Check(name, difference.size, float(difference.max()), "m/s² or rad/s², largest difference")
 
 
