@@ -97,7 +97,7 @@ DONE = 50.0
 
 MARGIN, MARGIN_SHARE = 1e-3, 0.02
 """A motion keeps so much from the ends of its cells' intervals [rad or m], and from the boundaries of regions
-[m]; at most this share of an interval, and half of what there is of a region [-]. So the log of a run shows,
+[m], but at most this share of an interval, and nearly what there is of a region [-]. So a log shows,
 between its rows, too, that it stayed in the cells."""
 
 LIMIT_SHARE = 0.995

@@ -538,7 +538,7 @@ def lay_planes(
         cells: First and last cell of every piece, shape (pieces, 2).
         edges: Edges of the regions of all cells, shape (E, 4) [m].
         first: First edge of every cell and the edge after the last one, shape (cells + 1,).
-        margin: Distance that they keep to the edges, at most half of what there is [m].
+        margin: Distance that they keep to the edges, or nine tenths of a smaller one [m].
         planes: Receives n and c of half-planes n . p >= c, shape (pieces, ``HALF_PLANES``, 3).
         counts: Receives their numbers.
 
@@ -583,7 +583,7 @@ def lay_planes(
             if length == 0.0:
                 return 0.0
             nx, ny = (px - qx) / length, (py - qy) / length
-            kept = min(margin, 0.5 * length)
+            kept = margin if length > margin else 0.9 * length
             planes[piece, counts[piece]] = np.array([nx, ny, nx * qx + ny * qy + kept])
             counts[piece] += 1
     return least

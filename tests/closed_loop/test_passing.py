@@ -12,7 +12,7 @@ from coop_drake.answers.log import SimulationLog
 from coop_drake.answers.plan import Plan
 from coop_drake.answers.problem import PlanningProblem
 from coop_drake.diagram import build_closed_loop
-from coop_drake.errors import PlanError, RefusalError, ScenarioError
+from coop_drake.errors import RefusalError, ScenarioError
 from coop_drake.laws.motion import motion_at
 from coop_drake.plant.facts import run_setup
 from coop_drake.scenario import Control, Deployment, Hold, Scenario
@@ -77,7 +77,7 @@ def test_its_log_is_verified_and_an_altered_one_refused(transport: Transport) ->
 def test_a_motion_is_for_an_ideal_team_that_is_not_held() -> None:
     scenario, plan = small_problem("base")
     for changes in ({"deployment": Deployment(control_rate=100.0)}, {"control": Control(hold=Hold())}):
-        with pytest.raises(PlanError, match="ideal team"):
+        with pytest.raises(ScenarioError, match="ideal team"):
             build_closed_loop(replace(scenario, **changes), with_motion(plan), small_maps())
 
 
