@@ -7,7 +7,6 @@ from typing import Annotated
 
 import numpy as np
 
-from coop_drake.answers.document import Corners
 from coop_drake.tree.arrays import FloatArray
 from coop_drake.typed_data import EXACT, Codec, DataError, NotNegative, Number, Positive, Vector
 
@@ -25,8 +24,8 @@ WAITING = 0.128
 W = 50 ms + 2 * 2 ms + 2 * 5 ms."""
 
 LARGEST_DAMPING, AGE_PHASE = 20.0, 0.4
-"""zeta_t is no larger [1/s], and no larger than this phase over the age of the commands [rad]; the pull is
-critically damped."""
+"""Largest zeta_t [1/s], and largest product of zeta_t and the age of the commands [rad]. K_t = zeta_t^2 / 4:
+the feedback is critically damped."""
 
 
 def _read_rows(rows: tuple[tuple[float, ...], ...]) -> FloatArray:
@@ -37,7 +36,9 @@ def _read_rows(rows: tuple[tuple[float, ...], ...]) -> FloatArray:
     return np.array(rows, dtype=np.float64)
 
 
-Rows = Annotated[FloatArray, Codec(tuple[tuple[Number, ...], ...], _read_rows, np.ndarray.tolist)]
+Windows = Annotated[FloatArray, Codec(tuple[tuple[Number, Number], ...], np.array, np.ndarray.tolist)]
+
+ControlPoints = Annotated[FloatArray, Codec(tuple[tuple[Number, ...], ...], _read_rows, np.ndarray.tolist)]
 
 
 @dataclass(frozen=True)
@@ -64,9 +65,9 @@ class Motion:
         damping: zeta_t, with which their rates are [1/s].
     """
 
-    points: Rows
+    points: ControlPoints
     period: Annotated[Positive, EXACT]
-    windows: Corners
+    windows: Windows
     rates: Vector
     waiting: Annotated[NotNegative, EXACT]
     ramp: Annotated[Positive, EXACT]

@@ -1,11 +1,12 @@
-"""The nominal motion of a team that passes from cell to cell, and the pull towards it.
+"""The nominal motion of a team that passes from cell to cell, and the feedback that keeps the team on it.
 
 All robots know the motion z(sigma), a spline, and follow it at the same phase sigma, whose rate is the pace
-rho, 1 but where the team brakes or starts. Every axis x of (x, y, theta, q) is accelerated by
+rho, 1 but where the team brakes or starts. The desired acceleration of every axis x of (x, y, theta, q) is
+the nominal one and a proportional-derivative feedback,
 
 x^'' - K_t (x - x^) - zeta_t (x' - x^'),  x^' = rho z',  x^'' = rho^2 z'' + rho' z',
 
-so that its departure from the motion obeys a linear equation that does not vary in time.
+so that its departure from the motion (the tracking error) obeys a linear equation that does not vary in time.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from coop_drake.tree.arrays import FloatArray
 
 @compiled
 def motion_at(
-    points: FloatArray, period: float, phase: float, pace: float, slowing: float, nominal: FloatArray
+    points: FloatArray, period: float, phase: float, pace: float, pace_rate: float, nominal: FloatArray
 ) -> None:
     """Write the nominal configuration, its rate and its acceleration.
 
@@ -25,7 +26,7 @@ def motion_at(
         period: Time of a span [s].
         phase: sigma; before the beginning and after the end the motion is at rest [s].
         pace: rho [-].
-        slowing: rho' [1/s].
+        pace_rate: rho' [1/s].
         nominal: Receives x^, x^' and x^'', shape (3, d).
     """
     spans = points.shape[0] - 3
@@ -40,7 +41,7 @@ def motion_at(
         nominal[0, k] = (value + u**3 * d) / 6.0
         nominal[1, k] = pace * rate
         bend = (w * (a - 2.0 * b + c) + u * (b - 2.0 * c + d)) / (period * period)
-        nominal[2, k] = pace * pace * bend + slowing * rate
+        nominal[2, k] = pace * pace * bend + pace_rate * rate
 
 
 @compiled(borrows=True)

@@ -27,7 +27,7 @@ from coop_drake.planning.cells.cells import FreeBox
 from coop_drake.planning.channel import Channel, CoveredPath, Regions
 from coop_drake.planning.duration import estimated, plan_time, timed
 from coop_drake.planning.limits import NEED_FACTOR, limits_of
-from coop_drake.planning.motion_limits import base_chains, base_places, motion_limits
+from coop_drake.planning.motion_limits import motion_limits, team_chains, times_at_limits
 from coop_drake.planning.questions import shrunk
 from coop_drake.planning.rescaling import Rescaling
 from coop_drake.planning.sampling.collision import ObstacleGrid, grid_inside
@@ -152,7 +152,7 @@ PASSING_SHARE = 0.4
 """Share of these steps where the team passes from cell to cell: overlaps of boxes make it quicker [-]."""
 
 HEARD_AFTER = 0.18
-"""What a cell that the team passes needs besides the stop: words, and ramps of the brake, about [s]."""
+"""Time that a cell needs besides the stop itself, for reports and for the ramps of the brake, about [s]."""
 
 LONG_WAY, LONG_WAY_STEP = 30.0, 0.6
 """On a path longer than this [m] waypoints may be this far apart [m]: most boxes are much longer there."""
@@ -228,7 +228,10 @@ def cover_path(
         points = _waypoints(boxes, grid, path, least_clearance, pads[0], PASSING_SHARE if passing else 1.0)
         if points is None:
             continue
-        steps = _seconds(problem, points) if passing else np.hypot(*np.diff(points[:, :2], axis=0).T)
+        if passing:
+            steps = times_at_limits(team_chains(problem), motion_limits(problem.limits), points)
+        else:
+            steps = np.hypot(*np.diff(points[:, :2], axis=0).T)
         places = np.concatenate([[0.0], np.cumsum(steps)])
         waypoints = Waypoints(
             boxes, grid, points, places, np.array(pads), goals, schedule_of(gain_set), limits,
@@ -247,16 +250,6 @@ def cover_path(
 def _wide(pads: tuple[float, ...], least: float) -> tuple[float, ...]:
     """Return the paddings that are wide enough, in place of narrower ones once and twice the least."""
     return tuple(sorted({pad for pad in (*pads, least, 2.0 * least) if pad >= max(least, pads[0])}))
-
-
-def _seconds(problem: PlanningProblem, points: FloatArray) -> FloatArray:
-    """Return the shortest times from waypoint to waypoint at the limits of speed, shape (n - 1,) [s]."""
-    of = problem.limits
-    chains = base_chains(problem.tree, list(zip(of.base_components, of.base_points, strict=True)))
-    bases, steps = np.diff(base_places(chains, points), axis=1), np.diff(points, axis=0)
-    moved = [np.hypot(bases[..., 0], bases[..., 1]), np.abs(bases[..., 2]), np.abs(steps[:, 3:].T)]
-    seconds: FloatArray = (np.concatenate(moved) / motion_limits(of)[1:, :1]).max(axis=0)
-    return seconds
 
 
 def _waypoints(
@@ -410,9 +403,10 @@ def choose_boxes(waypoints: Waypoints) -> IntArray:
 def _travel(waypoints: Waypoints, i: int, j: int, clearances: FloatArray, pad: float) -> float:
     """Time in which the object passes a box, from waypoint i to j [s].
 
-    It is that at the governor's steady speed. A team that passes from cell to cell takes the pace v [-] from
-    which it can stop within the box once it has heard that all have entered it: with l the time of the box's
-    way at the limits of speed, and w that of the words, w v + v^2 / 2 = l.
+    It is that at the governor's steady speed. A team that passes from cell to cell moves at the pace v [-]
+    from which it can stop within the box after it has received all reports of entry. With l the time of the
+    way through the box at the limits of speed, and w the time for reports (``HEARD_AFTER``), v solves
+    w v + v^2 / 2 = l.
 
     Args:
         waypoints: The waypoints.

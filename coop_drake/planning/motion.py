@@ -11,20 +11,22 @@ Along it the team runs at the pace rho, which is 1 but where it brakes or starts
 times those of the motion, its accelerations rho^2 A + rho' V, for the object, the bases and the joints
 alike, with V and A those at pace 1.
 
-The rule. A robot says that it has begun cell i when it enters it, at the time tau_i. The others know it a
-time W later and may have to say so, so that a team that lacks the word brakes at beta_i = tau_i + 2 W. It
-must then stop before x_i, where the motion leaves cell i. rho' falls to -kappa_i within a time r, and rises
-to zero within r at the end. A stop from rho = 1 so takes 1 / kappa_i + r, half of which is the way in t:
-kappa_i = 1 / (2 (x_i - beta_i) - r). From beta_(i-1) to x_i all
-accelerations s A - kappa_i V, with s = 0 and s = 1, are within their limits, and therefore all of
-rho^2 A + rho' V with rho from 0 to 1 and rho' from -kappa_i to 0: the team can brake at any time.
+The rule. When a robot enters cell i, at the time tau_i, it reports this to the others. They receive the
+report at most W later. A robot that misses a report tells the others, which takes at most W more. So the
+team begins to brake at beta_i = tau_i + 2 W at the latest. It must be at rest before x_i, the time at which
+the motion leaves cell i. In a stop, rho' falls from 0 to -kappa_i within the time r, stays there, and rises
+to 0 within r. A stop from rho = 1 takes 1 / kappa_i + r, in which t advances by half as much. Therefore
+kappa_i = 1 / (2 (x_i - beta_i) - r). Between beta_(i-1) and x_i, the accelerations A, -kappa_i V and
+A - kappa_i V are within their limits. So is every rho^2 A + rho' V with rho from 0 to 1 and rho' from
+-kappa_i to 0: the team can brake at any time.
 
-The program. t at the end is minimised with a logarithmic barrier for each limit, by Newton's method with
-the Gauss-Newton part of the second derivatives. All terms but kappa join at most four neighbouring control
-points, so that the matrix has a band; kappa_i joins the control points about tau_i and x_i, through as many
-more unknowns as there are cells. First, t is free: the spans of every cell then stay the same. Then, the
-motion is written as a spline of the time with equal spans, whose length is the only unknown time: its
-accelerations are linear between knots, where all limits are checked.
+The optimisation problem. The end time is minimised by an interior-point method: every limit has a
+logarithmic barrier, and Newton's method uses the Gauss-Newton part of the Hessian. Every term without kappa
+depends on at most four neighbouring control points, so the Hessian is banded. kappa_i couples the control
+points near tau_i to those near x_i; one extra unknown per cell keeps the Hessian sparse. In the first phase
+the times of the control points are free, and every cell keeps its spans. In the second phase all spans last
+equally long, and their length is the only unknown time. Accelerations are then linear between knots, where
+limits are kept; a last slowing keeps them between the knots, too.
 """
 
 from __future__ import annotations
@@ -38,6 +40,7 @@ import numpy as np
 import scipy.linalg
 import shapely
 from numpy.typing import NDArray
+from scipy.interpolate import BSpline
 
 from coop_drake.answers.motion import AGE_PHASE, LARGEST_DAMPING, WAITING, Motion
 from coop_drake.answers.plan import Plan
@@ -56,7 +59,13 @@ from coop_drake.planning.motion_barrier import (
     lay_planes,
     newton_step,
 )
-from coop_drake.planning.motion_limits import Chains, base_chains, base_places, largest_shares, motion_limits
+from coop_drake.planning.motion_limits import (
+    Chains,
+    largest_shares,
+    motion_limits,
+    team_chains,
+    times_at_limits,
+)
 from coop_drake.tree.arrays import FloatArray, IntArray
 
 SPAN_TIME = 0.3
@@ -69,10 +78,10 @@ PARTS = 4
 """Parts of a span of the motion that is made, at whose ends cells may be entered and left [-]."""
 
 OVERLAP_SPANS = 3.0
-"""Fewest spans of an overlap of two cells, before the program [-]; doubled where these are too few."""
+"""Fewest spans in the overlap of two cells, initially [-]; doubled where no initial path is found."""
 
 CLEARANCE_SPANS = 1.0
-"""Spans per way as long as the clearance there, before the program [-]."""
+"""Fewest spans in a piece of path that is as long as the clearance there, initially [-]."""
 
 SAMPLES = 24
 """Samples of the first way in a cell [-]."""
@@ -93,12 +102,13 @@ UNIFORM_WEIGHTS = (2e-4, 3e-5)
 """Weights of the barrier while spans are equal [s]."""
 
 DONE = 50.0
-"""The next weight is taken when the slope of a step is less steep than this number of weights [-]."""
+"""The next weight is taken when a step promises a decrease of less than this many weights [-]."""
 
 MARGIN, MARGIN_SHARE = 1e-3, 0.02
-"""A motion keeps so much from the ends of its cells' intervals [rad or m], and from the boundaries of regions
-[m], but at most this share of an interval, and nearly what there is of a region [-]. So a log shows,
-between its rows, too, that it stayed in the cells."""
+"""Distance that a motion keeps from the ends of its cells' intervals [rad or m] and from the boundaries of
+their regions [m]; and the largest share of an interval that this distance may take [-]. Where a piece is
+nearer to a boundary, the motion keeps nine tenths of its distance. So a log can show that the states between
+its rows are in the cells, too."""
 
 LIMIT_SHARE = 0.995
 """Share of every limit that a motion uses [-]: the team departs from it by rounding and integration."""
@@ -107,10 +117,11 @@ MUCH_SLOWER = 1.02
 """Where limits between knots ask for times that are longer by more than this factor, spans are halved [-]."""
 
 FINER = 2
-"""How often spans are halved where the motion to begin with does not enter every cell [-]."""
+"""How often spans are halved where the initial path does not enter every cell, or limits between knots ask
+for much slower motions [-]."""
 
 STEPS, ROUNDS = 2, 80
-"""Newton steps with the same half-planes, and largest number of times that these are laid anew [-]."""
+"""Newton steps with the same half-planes, and how often new half-planes are made at most [-]."""
 
 SLOWER = 1.01
 """Factor by which all times grow until every limit is kept [-]."""
@@ -119,7 +130,7 @@ ACCEPTED = 0.01
 """Share of the decrease that the slope promises with which a step is accepted [-]."""
 
 
-# The way to begin with: along the plan's paths, every span in a cell.
+# The initial path: along the plan's paths, every span in a cell.
 
 
 def first_points(plan: Plan, chains: Chains, limits: FloatArray, overlap: float) -> FloatArray:
@@ -150,12 +161,7 @@ def first_points(plan: Plan, chains: Chains, limits: FloatArray, overlap: float)
     for index, (before, after) in enumerate(pairwise(ways)):
         overlaps.append((_inside(plan, index + 1, before), _inside(plan, index, after)))
     way, clearance = np.concatenate(ways), np.concatenate(clearances)
-    steps, bases = np.diff(way, axis=0), np.diff(base_places(chains, way), axis=1)
-    turned = np.concatenate(
-        [np.hypot(bases[..., 0], bases[..., 1]), np.abs(bases[..., 2]), np.abs(steps[:, 3:].T)]
-    )
-    speeds = np.where(np.isfinite(limits[1:, 0]), limits[1:, 0], 1.0)
-    spans = (turned / speeds[:, None]).max(axis=0) / SPAN_TIME
+    steps, spans = np.diff(way, axis=0), times_at_limits(chains, limits, way) / SPAN_TIME
     room = np.maximum(np.minimum(clearance[1:], clearance[:-1]), 1e-4)
     spans = np.maximum(spans, CLEARANCE_SPANS * np.hypot(*steps[:, :2].T) / room)
     for index, (reached, left) in enumerate(overlaps):
@@ -240,10 +246,10 @@ def pieces_inside(cells: CellSets, points: FloatArray, shares: FloatArray) -> ND
     pieces = np.einsum("ske,qbe->sqkb", spans, shares).reshape(-1, points.shape[1], 4)
     inside = np.zeros((len(cells.regions), len(pieces)), bool)
     least, most = pieces[:, 2:].min(axis=2), pieces[:, 2:].max(axis=2)
+    hulls = shapely.convex_hull(shapely.linestrings(pieces[:, :2].transpose(0, 2, 1)))
     for index, region in enumerate(cells.regions):
         found = ((least > cells.lower[index]) & (most < cells.upper[index])).all(axis=1)
-        lines = shapely.linestrings(pieces[found][:, :2].transpose(0, 2, 1))
-        inside[index, found] = shapely.contains_properly(region, shapely.convex_hull(lines))
+        inside[index, found] = shapely.contains_properly(region, hulls[found])
     return inside
 
 
@@ -260,14 +266,14 @@ def pieces_of_cells(inside: NDArray[np.bool_]) -> tuple[IntArray, IntArray]:
         begin = begin + int(np.argmax(row[begin:] & (inside[max(cell - 1, 0), begin:])))
         low = high = begin
         if not row[begin]:
-            raise PlanError(f"the way to begin with does not enter cell {cell}")
+            raise PlanError(f"the initial path does not enter cell {cell}")
         while low > 0 and row[low - 1]:
             low -= 1
         while high + 1 < pieces and row[high + 1]:
             high += 1
         first[cell], last[cell] = low, high
     if first[0] != 0 or last[-1] != pieces - 1:
-        raise PlanError("the way to begin with leaves the first or the last cell")
+        raise PlanError("the initial path leaves the first or the last cell")
     return first, last
 
 
@@ -294,8 +300,8 @@ def brake(
     for cell in range(len(windows) - 1):
         tau = x = 0.0
         for e in range(4):
-            tau += time_shares(windows[cell, 0])[e] * points[int(windows[cell, 0]) + e, T]
-            x += time_shares(windows[cell, 1])[e] * points[int(windows[cell, 1]) + e, T]
+            tau += time_shares(windows[cell, 0])[e] * points[min(int(windows[cell, 0]) + e, m - 1), T]
+            x += time_shares(windows[cell, 1])[e] * points[min(int(windows[cell, 1]) + e, m - 1), T]
         left = 2.0 * (x - tau - waiting) - BRAKE_RAMP
         if not left > 0.0:
             return False
@@ -320,30 +326,25 @@ def time_shares(u: float) -> tuple[float, float, float, float]:
     return (1.0 - s) / 6.0, (4.0 - 3.0 * s) / 6.0, (1.0 + 3.0 * s) / 6.0, s / 6.0
 
 
-def quickest_motion(
-    plan: Plan, problem: PlanningProblem, age: float = 0.0, waiting: float = WAITING
-) -> Motion:
+def quickest_motion(plan: Plan, problem: PlanningProblem, age: float) -> Motion:
     """Return the quickest motion found.
 
     Args:
         plan: The plan, with its cells.
         problem: The question that it answers, with the team and its limits.
         age: How old commands are when they act: what is measured, computed, and followed with a lag [s].
-        waiting: 2 W, how long after a cell is begun robots may know it of each other [s].
 
     Raises:
         PlanError: No motion was found that stays in the cells; says where.
     """
-    of = problem.limits
-    chains = base_chains(problem.tree, list(zip(of.base_components, of.base_points, strict=True)))
-    table = LIMIT_SHARE * motion_limits(of)
+    chains, table = team_chains(problem), LIMIT_SHARE * motion_limits(problem.limits)
     cells = cell_sets(plan)
     free = np.where([True, True, False], table, inf)  # Jerk is limited where spans are equal.
     for finer in range(FINER + 1):
         points = first_points(plan, chains, table, OVERLAP_SPANS * 2**finer)
         points = np.column_stack([points, SPAN_TIME * (np.arange(len(points)) - 1.0)])
         try:
-            program = _Program(cells, chains, free, waiting, points, uniform=False)
+            program = _Program(cells, chains, free, WAITING, points, uniform=False)
             break
         except PlanError:
             if finer == FINER:
@@ -352,17 +353,19 @@ def quickest_motion(
     for finer in range(FINER + 1):
         equal = uniform_points(program.points, PERIOD / 2**finer)
         try:
-            last = _Program(cells, chains, table, waiting, equal, uniform=True)
+            last = _Program(cells, chains, table, WAITING, equal, uniform=True)
         except PlanError:
             if finer == FINER:
                 raise
             continue
         last.solve(UNIFORM_WEIGHTS)
-        made, slower = last.slowed()
-        if slower < MUCH_SLOWER:
+        factor = last.slow_down()
+        if factor < MUCH_SLOWER:
             break
+    period = float(last.points[2, -1] - last.points[1, -1])
+    made = last.points[:, :-1].copy(), period, period * last.windows, last.kappa.copy()
     damping = min(LARGEST_DAMPING, AGE_PHASE / age) if age > 0.0 else LARGEST_DAMPING
-    return Motion(*made, waiting, BRAKE_RAMP, 0.25 * damping * damping, damping)
+    return Motion(*made, WAITING, BRAKE_RAMP, 0.25 * damping * damping, damping)
 
 
 def uniform_points(points: FloatArray, period: float) -> FloatArray:
@@ -376,12 +379,7 @@ def uniform_points(points: FloatArray, period: float) -> FloatArray:
         Control points (z, t), t that of equal spans.
     """
     u = np.linspace(0.0, len(points) - 3.0, 16 * (len(points) - 3) + 1)
-    span = np.minimum(u.astype(int), len(points) - 4)
-    s = (u - span)[:, None]
-    dense = (
-        (1.0 - s) ** 3 * points[span] + (3.0 * s**3 - 6.0 * s**2 + 4.0) * points[span + 1]
-        + (3.0 * (1.0 - s) ** 3 - 6.0 * (1.0 - s) ** 2 + 4.0) * points[span + 2] + s**3 * points[span + 3]
-    ) / 6.0  # fmt: skip
+    dense = BSpline(np.arange(len(points) + 4.0) - 3.0, points, 3)(u)
     count = max(int(np.ceil((dense[-1, -1] - dense[0, -1]) / period)), 6)
     times = np.linspace(dense[0, -1], dense[-1, -1], count + 1)
     knots = np.stack([np.interp(times, dense[:, -1], column) for column in dense[:, :-1].T], axis=1)
@@ -408,6 +406,12 @@ class _Program:
         waiting: 2 W [s].
         points: Control points (z, t), shape (m, D).
         uniform: Whether all spans last equally long.
+
+    Besides, it has the parts of a span (``shares``), the first and the last piece of every cell (``first``,
+    ``last``), u at which the motion enters and leaves every cell (``windows``, shape (cells, 2)), kappa and
+    where it acts (``kappa``, ``acting``, see ``brake``), which unknowns are held (``held``), how they change
+    with the length of a span (``lengths``), least times between control points (``shortest``), and the
+    ``course`` of ``barrier``.
     """
 
     cells: CellSets
@@ -429,7 +433,6 @@ class _Program:
         if self.uniform:
             self.lengths[D - 1 :: D] = np.arange(m) - 1.0
         self.kappa, self.acting = np.zeros(len(self.first)), np.zeros((m, 1 + BRAKES), np.int64)
-        self.steps = 0
 
     def _inside(self, shares: FloatArray) -> NDArray[np.bool_]:
         return pieces_inside(self.cells, self.points[:, :-1], shares)
@@ -489,7 +492,7 @@ class _Program:
         """Return what is minimised, infinite where a limit is not kept, and add its derivatives."""
         if not brake(points, self.windows, self.waiting, self.kappa, self.acting):
             return inf
-        given = slopes or Slopes(*(np.empty(shape) for shape in ((0, 0), 0, (0, 0), (0, 0), 0)))
+        given = slopes or Slopes(*(np.empty(shape) for shape in ((0, 0), 0, (0, 0), 0, 0)))
         value = float(points[-2, -1])
         value += barrier(points, weight, self.course, self.kappa, self.acting, given, slopes is not None)
         if not self.uniform:
@@ -507,7 +510,7 @@ class _Program:
             now = self.value(self.points, weight)
         for _ in range(STEPS):
             slopes = Slopes(
-                np.zeros((m * D, 4 * D)), np.zeros(m * D), np.zeros((cells, m * D)), np.zeros((cells, cells)),
+                np.zeros((m * D, 4 * D)), np.zeros(m * D), np.zeros((cells, m * D)), np.zeros(cells),
                 np.zeros(cells),
             )  # fmt: skip
             self.value(self.points, weight, slopes)
@@ -520,7 +523,6 @@ class _Program:
                     places[cell, each] = (np.minimum(int(u) + np.arange(4), m - 1) + 1) * D - 1
                     shares[cell, each] = sign * self.kappa[cell] * np.array(time_shares(u))
             slope = newton_step(slopes, places, shares, self.held, self.lengths, step)
-            self.steps += 1
             share = 1.0
             while share > 1e-5:
                 moved = self.points + share * step.reshape(m, D)
@@ -535,20 +537,18 @@ class _Program:
                 return True
         return -slope < DONE * weight
 
-    def slowed(self) -> tuple[tuple[FloatArray, float, FloatArray, FloatArray], float]:
-        """Return control points, period, windows and rates, slowed as limits between knots ask for.
+    def slow_down(self) -> float:
+        """Lengthen the spans as limits between knots ask for, and return by which factor.
 
-        And by which factor. Slower, the team brakes less quickly, too, so that one factor is enough.
+        Slower, the team brakes less quickly, too, so that one factor is enough.
         """
-        points, (period, factor) = self.points[:, :-1].copy(), (self.points[2, -1] - self.points[1, -1], 1.0)
-        for slower in (True, False):
-            timed = self.points.copy()
-            timed[:, -1] *= factor
-            brake(timed, self.windows, self.waiting, self.kappa, self.acting)
-            windows = factor * period * self.windows
-            if slower:
-                begin = np.append(-inf, windows[:-1, 0] + self.waiting)[:-1]
-                ranges = np.stack([begin, windows[:-1, 1]], axis=1)
-                shares = largest_shares(points, period, self.chains, self.limits, self.kappa, ranges)
-                factor = max(shares[0], shares[1] ** 0.5, shares[2] ** (1.0 / 3.0), 1.0)
-        return (points, float(factor * period), windows, self.kappa.copy()), factor
+        points, period = self.points[:, :-1].copy(), float(self.points[2, -1] - self.points[1, -1])
+        windows = period * self.windows
+        brake(self.points, self.windows, self.waiting, self.kappa, self.acting)
+        begin = np.append(-inf, windows[:-1, 0] + self.waiting)[:-1]
+        ranges = np.stack([begin, windows[:-1, 1]], axis=1)
+        fast, hard, rough = largest_shares(points, period, self.chains, self.limits, self.kappa, ranges)
+        factor = max(fast, hard**0.5, rough ** (1.0 / 3.0), 1.0)
+        self.points[:, -1] *= factor
+        brake(self.points, self.windows, self.waiting, self.kappa, self.acting)
+        return float(factor)

@@ -64,7 +64,7 @@ class Slopes(NamedTuple):
         band: Second derivatives by an unknown and itself or one of the next ones, shape (m D, 4 D).
         point: First derivatives, shape (m D,).
         mixed: Second derivatives by log kappa and the control points, shape (cells, m D).
-        rates: Second derivatives by log kappa, shape (cells, cells).
+        rates: Second derivatives by log kappa of one cell, shape (cells,); those of two cells are zero.
         rate: First derivatives by log kappa, shape (cells,).
     """
 
@@ -241,7 +241,7 @@ def barrier(
             for p in range(acts):
                 cell = acting[j, 1 + p]
                 slopes.rate[cell] += first[4 + p]
-                slopes.rates[cell, cell] += second[4 + p, 4 + p]
+                slopes.rates[cell] += second[4 + p, 4 + p]
                 for c in range(count):
                     slopes.mixed[cell, begin + places[c]] += after[4 + p, c]
     return total + _add_cells(points, weight, course, slopes, derive)
@@ -391,8 +391,9 @@ def newton_step(
 ) -> float:  # fmt: skip
     """Write Newton's step, and return the slope along it.
 
-    With l = B p the changes of log kappa, H p + M' l - B' n = -g, M p + L l + n = -g_l. Where spans are
-    equal, p has one more unknown, their length, that moves all times.
+    p is the change of the control points, l = B p that of log kappa, and n the multipliers of l = B p:
+    H p + M' l - B' n = -g and M p + L l + n = -g_l. Where all spans are equally long, p has one more unknown,
+    h, the change of that length, which moves the times of all control points.
 
     Args:
         slopes: H, g, M, L and g_l.
@@ -451,8 +452,7 @@ def newton_step(
         system[cell, cell] -= 1.0
         system[cells + cell, cells + cell] += 1.0
         right[cells + cell] -= slopes.rate[cell]
-        for other in range(cells):
-            system[cells + cell, other] += slopes.rates[cell, other]
+        system[cells + cell, cell] += slopes.rates[cell]
         for j in range(max(begin[cell], 0), end[cell] + 1):
             if not held[j] and slopes.mixed[cell, j] != 0.0:
                 _add_row(system, right, cells + cell, slopes.mixed[cell, j], sides[j], cells)

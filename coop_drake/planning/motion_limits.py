@@ -17,8 +17,9 @@ from coop_drake.answers.motion import (
     TURN_ACCELERATION,
     TURN_RATE,
 )
-from coop_drake.answers.problem import TeamLimits
+from coop_drake.answers.problem import PlanningProblem, TeamLimits
 from coop_drake.jit import compiled
+from coop_drake.laws.motion import motion_at
 from coop_drake.tree.arrays import FloatArray, IntArray
 from coop_drake.tree.component_tree import ComponentTree
 
@@ -110,6 +111,12 @@ def base_chains(tree: ComponentTree, bases: list[tuple[int, tuple[float, float]]
     return chains
 
 
+def team_chains(problem: PlanningProblem) -> Chains:
+    """Return where the bases' origins are."""
+    of = problem.limits
+    return base_chains(problem.tree, list(zip(of.base_components, of.base_points, strict=True)))
+
+
 def base_places(chains: Chains, motion: FloatArray) -> FloatArray:
     """Return the positions and angles of all bases, shape (bases, samples, 3) [m, rad].
 
@@ -130,6 +137,20 @@ def base_places(chains: Chains, motion: FloatArray) -> FloatArray:
             found[base, :, 1] += s * x + c * y
             found[base, :, 2] = angle
     return found
+
+
+def times_at_limits(chains: Chains, limits: FloatArray, points: FloatArray) -> FloatArray:
+    """Return the shortest times between configurations at the limits of speed, shape (samples - 1,) [s].
+
+    Args:
+        chains: The bases.
+        limits: See ``motion_limits``.
+        points: Configurations, shape (samples, 3 + n).
+    """
+    bases, steps = np.diff(base_places(chains, points), axis=1), np.diff(points, axis=0)
+    moved = [np.hypot(bases[..., 0], bases[..., 1]), np.abs(bases[..., 2]), np.abs(steps[:, 3:].T)]
+    seconds: FloatArray = (np.concatenate(moved) / limits[1:, :1]).max(axis=0)
+    return seconds
 
 
 # What moves: the object (point 0), the bases, their angles, and the joints, with derivatives.
@@ -242,25 +263,13 @@ def largest_shares(
     """
     m, d = points.shape
     fastest, hardest, roughest = 0.0, 0.0, 0.0
-    x, v, a = np.empty(d), np.empty(d), np.empty(d)
+    nominal = np.empty((3, d))
     moved, by, before = np.empty((2, 2)), np.empty((4, 2, d)), np.zeros((len(limits), 2))
     for span in range(m - 3):
         for check in range(CHECKS + 1):
-            u = check / CHECKS
-            w = 1.0 - u
-            for k in range(d):
-                p0, p1, p2, p3 = (
-                    points[span, k],
-                    points[span + 1, k],
-                    points[span + 2, k],
-                    points[span + 3, k],
-                )
-                x[k] = (w**3 * p0 + (3 * u**3 - 6 * u * u + 4) * p1) / 6.0
-                x[k] += ((3 * w**3 - 6 * w * w + 4) * p2 + u**3 * p3) / 6.0
-                v[k] = 0.5 * (w * w * (p1 - p0) + u * u * (p3 - p2)) + (0.5 + u * w) * (p2 - p1)
-                a[k] = (w * (p0 - 2.0 * p1 + p2) + u * (p1 - 2.0 * p2 + p3)) / (period * period)
-                v[k] /= period
-            time = (span + u) * period
+            time = (span + check / CHECKS) * period
+            motion_at(points, period, time, 1.0, 0.0, nominal)
+            x, v, a = nominal[0], nominal[1], nominal[2]
             for point in range(len(limits)):
                 size = follow(chains, point, x, v, a, moved, by)
                 speed = np.sqrt((moved[0, :size] ** 2).sum())

@@ -88,7 +88,7 @@ def plan(
             raise ValueError(f"effort is {effort}; allowed are numbers of 0 or more")
         problem = replace(problem, settings=replace(problem.settings, effort=effort))
     if problem.settings.hand_over == "pass" and (budget is not None or not problem.limits.base_components):
-        raise ValueError("hand_over: pass is for teams whose bases are known, without a budget")
+        raise ValueError("hand_over: pass needs limits.base_components and allows no budget")
     # Floors are remembered by question, and the caller may change the arrays of a question between two calls.
     problem = replace(problem, start=problem.start.copy(), goal_pose=problem.goal_pose.copy())
     local, near = local_question(problem), None
@@ -115,13 +115,14 @@ def _passing(
 
     age = gain_set.age if isinstance(gain_set, ScheduledGains) else 0.0
     if progress is not None:
-        progress("planning the motion through all cells", 0.0)
+        with suppress(PatienceError):  # The plan is certified: it gets its motion.
+            progress("planning the motion through all cells", 0.0)
     try:
         return replace(answer, plan=replace(answer.plan, motion=quickest_motion(answer.plan, problem, age)))
     except (PlanError, np.linalg.LinAlgError) as error:
         return Undecided(
-            f"no motion was found that passes the cells of a plan without a stop: {error}; "
-            "planner.hand_over: rest gives the plan",
+            f"a plan was found, but no motion through its cells without a stop: {error}; "
+            "with planner.hand_over: rest that plan is returned",
             answer.report,
         )
 

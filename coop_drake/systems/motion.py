@@ -26,9 +26,8 @@ class _Follower(Block):
 
     def _nominal(self, context: Context) -> FloatArray:
         """Return the nominal configuration, its rate and its acceleration now, shape (3, 3 + n)."""
-        nominal, time = np.empty((3, self._motion.points.shape[1])), context.get_time()
-        ended = time >= self._motion.duration
-        motion_at(self._motion.points, self._motion.period, time, 0.0 if ended else 1.0, 0.0, nominal)
+        nominal = np.empty((3, self._motion.points.shape[1]))
+        motion_at(self._motion.points, self._motion.period, context.get_time(), 1.0, 0.0, nominal)
         return nominal
 
 
