@@ -52,10 +52,10 @@ def _setting_faults(scenario: Scenario) -> Faults:
         yield "gains.selected", scenario.gains.selected, f"a gain set, one of {known}"
     if scenario.planner.hand_over == "pass":
         if not scenario.ideal or scenario.deployment.budget != "none":
-            said = "rest where deployment is stated, or grasps are not joints"
+            said = "rest; pass needs a scenario without deployment, whose grasps are joints"
             yield "planner.hand_over", "pass", said
         if scenario.control.hold is not None:
-            yield "planner.hand_over", "pass", "rest where control.hold is stated"
+            yield "planner.hand_over", "pass", "rest; pass needs a scenario without control.hold"
     hold = scenario.control.hold
     if hold is not None and hold.silence is not None and scenario.deployment.control_rate is None:
         yield "control.hold.silence", hold.silence, "null without deployment.control_rate"
@@ -71,9 +71,13 @@ def _name_faults(scenario: Scenario, robots: Sequence[str]) -> Faults:
         yield "robots", OBJECT, f"another name: limits.{OBJECT} has the limits of the object"
     for name, stated in scenario.limits.items():
         if name != OBJECT and stated.acceleration is not None:
-            yield f"limits.{name}.acceleration", stated.acceleration, f"null: it belongs to limits.{OBJECT}"
+            yield (
+                f"limits.{name}.acceleration",
+                stated.acceleration,
+                f"null; only limits.{OBJECT} has this key",
+            )
         if name == OBJECT and replace(stated, acceleration=None) != RobotLimits():
-            yield f"limits.{name}", name, "acceleration alone"
+            yield f"limits.{name}", name, "only the key acceleration"
     for name in scenario.deployment.robots:
         if name not in (*robots, ALL_ROBOTS):
             known = f'a robot, one of {", ".join(robots)}, or "{ALL_ROBOTS}"'

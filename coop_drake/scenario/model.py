@@ -234,12 +234,13 @@ class RobotLimits:
         joint_rates: Largest rates of the joints, from the base to the end effector; a single one counts for
             all [rad/s or m/s].
         joint_accelerations: Largest accelerations of the joints, likewise [rad/s^2 or m/s^2].
-        base_acceleration: Largest acceleration of the base's frame [m/s^2]. This and the next two count for
-            ``hand_over: pass``; null stands for 1 m/s^2, 2 rad/s^2 and 10 m/s^3.
+        base_acceleration: Largest acceleration of the base's frame [m/s^2]. This key and the next two are
+            used only with ``hand_over: pass``. Null means 1 m/s^2, 2 rad/s^2 and 10 m/s^3; then, unknown
+            speeds of bases are 1 m/s and 1.5 rad/s, unknown limits of joints 1 rad/s and 2 rad/s^2.
         base_turn_acceleration: Largest acceleration of the base's angle [rad/s^2].
         base_jerk: Largest jerk of the base's frame [m/s^3].
-        acceleration: Largest acceleration of the object, under the name ``object`` alone, likewise; null
-            stands for 1.5 m/s^2 [m/s^2].
+        acceleration: Largest acceleration of the object, in the entry ``object`` alone, used as these; null
+            means 1.5 m/s^2 [m/s^2].
     """
 
     base_speed: Positive | None = None

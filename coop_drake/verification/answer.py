@@ -168,9 +168,10 @@ def _unproved_of_control(plan: Plan) -> str:
     """What a plan's checks leave open of whether a team stays in its cells."""
     if plan.motion is not None:
         return (
-            "that a team follows the motion, or brakes (the motion is for an ideal team; the checks of gains "
-            "and estimated times are about one that rests in every cell); what it asks of motors; jerk but "
-            "for its mean over each span; limits where it goes on after a stop"
+            "that an ideal team, for which alone the motion is planned, follows it or brakes (the checks of "
+            "gains and of estimated times are about a team that rests in every cell); that motors can give "
+            "the efforts that the motion needs; that jerk is within its limit at every instant (only its "
+            "mean over each span is checked); that limits are kept while the team starts again after a stop"
         )
     if plan.budget is None:
         return "that a team stays in the cells (verify the log of its run, or plan with --budget)"

@@ -43,7 +43,7 @@ INSIDE = 1e-12
 Bezier point by less."""
 
 DEPTH, MOST = 16, 200_000
-"""How often parts are halved before what is not proved is refused, and the number of parts that may be."""
+"""Largest number of halvings, and largest number of parts; what is unproved then is refused [-]."""
 
 BEZIER = (
     np.array([[1.0, 4.0, 1.0, 0.0], [0.0, 4.0, 2.0, 0.0], [0.0, 2.0, 4.0, 0.0], [0.0, 1.0, 4.0, 1.0]]) / 6
@@ -66,11 +66,11 @@ def check_motion(plan: Plan, problem: PlanningProblem, gain_set: GainSet) -> lis
     if motion is None:
         return []
     if plan.refused_by:
-        raise RefusalError("motion", "is stated, but a way that limits refuse has none")
+        raise RefusalError("motion", "is stated, but a plan that limits refuse has no motion")
     if plan.budget is not None:
         # A budget has delays and clocks: ``motion.waiting`` is to be compared with them here.
         raise RefusalError(
-            "motion", "is stated with a budget; motions of plans without one alone are checked"
+            "motion", "is stated with a budget; only motions of plans without a budget can be checked"
         )
     if not problem.limits.base_components:
         raise RefusalError("motion", "is stated, but the problem does not say where the bases are")
@@ -336,8 +336,9 @@ class _Mover(NamedTuple):
     ) -> tuple[FloatArray, FloatArray]:
         """Bound |V''| and |A''|, shape (P,), by bounds on |z|, |z'|, |z''|, |z'''|; z'''' is 0 in a span.
 
-        A stage that turns at the rate w adds w times a value, turned by a right angle, to its derivative: to
-        x, x', ... of what it carries apply powers of (d/dt + i w).
+        Write vectors of the plane as complex numbers. A stage that turns at the rate w changes the derivative
+        d/dt of a vector that it carries into (d/dt + i w), and the k-th derivative into the k-th power of it.
+        The bound is the sum of the magnitudes of all terms of that power.
         """
         if self.axes is not None:
             return np.linalg.norm(j @ np.abs(self.axes).T, axis=1), np.zeros(len(j))
@@ -395,10 +396,18 @@ def _check_limits(motion: Motion, windows: FloatArray, problem: PlanningProblem)
     movers = list(_movers(problem))
     found = [_prove_limits(motion, mover, every) for mover in movers]
     name = "limits of speed and acceleration are kept at all times, while braking, too"
-    kept = Check(name, sum(count for count, _ in found), min(left for _, left in found), "of one left")
+    kept = Check(
+        name,
+        sum(count for count, _ in found),
+        min(left for _, left in found),
+        "least share of a limit that is left",
+    )
     jerks = [1.0 - _largest_jerk(motion, mover) for mover in movers if mover.jerk < inf]
     name = "limits of the bases' jerk are kept in the mean over each span, at full pace"
-    return [kept, Check(name, len(jerks) * (len(motion.points) - 3), min(jerks), "of one left")]
+    return [
+        kept,
+        Check(name, len(jerks) * (len(motion.points) - 3), min(jerks), "least share of a limit that is left"),
+    ]
 
 
 def _prove_limits(motion: Motion, mover: _Mover, parts: _Parts) -> tuple[int, float]:

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.interpolate import BSpline
 
 from coop_drake import load_scenario
 from coop_drake.answers.log import SimulationLog
@@ -13,12 +14,13 @@ from coop_drake.answers.plan import Plan
 from coop_drake.answers.problem import PlanningProblem
 from coop_drake.diagram import build_closed_loop
 from coop_drake.errors import RefusalError, ScenarioError
-from coop_drake.laws.motion import motion_at
 from coop_drake.plant.facts import run_setup
 from coop_drake.scenario import Control, Deployment, Hold, Scenario
 from coop_drake.scenario.checks import validate
 from coop_drake.scenario.model import RobotLimits
 from coop_drake.simulation import build_maps, simulate
+from coop_drake.verification.runs.motion import check_followed
+from coop_drake.verification.runs.rows import Rows
 from coop_drake.verification.runs.verify_log import verify_log
 from tests.support.motions import passing, planned_motion
 from tests.support.small_loop import small_maps, small_problem
@@ -39,10 +41,10 @@ def test_the_team_arrives_when_the_motion_says_and_follows_it(transport: Transpo
     assert motion is not None
     assert log.reached
     assert log.times[-1] == pytest.approx(motion.duration, rel=0.02)
-    nominal = np.empty((3, motion.points.shape[1]))
-    for time, pose, joints in zip(log.times, log.object_pose, log.joints, strict=True):
-        motion_at(motion.points, motion.period, time, 1.0, 0.0, nominal)
-        np.testing.assert_allclose(np.concatenate([pose, joints]), nominal[0], rtol=0, atol=1e-4)
+    spline = BSpline(motion.period * (np.arange(len(motion.points) + 4) - 3.0), motion.points, 3)
+    nominal = spline(np.minimum(log.times, motion.duration))
+    # The integrator's error: ten times what is seen.
+    np.testing.assert_allclose(np.hstack([log.object_pose, log.joints]), nominal, rtol=0, atol=1e-4)
 
 
 def test_it_never_stops_between_start_and_goal(transport: Transport) -> None:
@@ -64,14 +66,38 @@ def test_its_log_is_verified_and_an_altered_one_refused(transport: Transport) ->
     setup = run_setup(scenario)
     assert verify_log(log, plan, problem, setup).answer == "arrived"
     middle = len(log.times) // 2
-    for name, shift in (
-        ("governor_position", 1e-6), ("energy_margin", 1e-4), ("ready_margins", 1e-3), ("funnel_upper", 1e-6),
-        ("object_pose", 1e-4), ("accelerations", 1e-4), ("cell_index", 1),
-    ):  # fmt: skip
+    for name, shift, where in (
+        ("governor_position", 1e-6, f"governor_position[{middle}"),
+        ("energy_margin", 1e-4, f"energy_margin[{middle}"),
+        ("ready_margins", 1e-3, f"ready_margins[{middle}"),
+        ("funnel_upper", 1e-6, f"funnel_margin[{middle}"),
+        ("object_pose", 1e-4, f"object_pose, joints[{middle}"),
+        ("accelerations", 1e-4, f"accelerations[{middle}"),
+        ("cell_index", 1, f"cell_index[{middle + 1}"),
+    ):
         changed = getattr(log, name).copy()
         changed[middle] += shift
-        with pytest.raises(RefusalError):
+        with pytest.raises(RefusalError) as refusal:
             verify_log(replace(log, **{name: changed}), plan, problem, setup)
+        assert refusal.value.where.startswith(where)
+
+
+def test_a_run_off_its_motion_is_refused(transport: Transport) -> None:
+    """The log is whole in itself, but of another motion: later, or pulled to with other gains."""
+    _, problem, plan, log = transport
+    motion = plan.motion
+    assert motion is not None
+    rows = Rows(log, plan)
+    assert len(check_followed(rows, problem, exact=True)) == 8
+    for changes, where in (
+        ({"period": 1.001 * motion.period}, "governor_position"),
+        ({"windows": motion.windows + np.array([0.05, 0.0])}, "cell_index"),
+        ({"points": motion.points + 1e-5 * np.eye(motion.points.shape[1])[-1]}, "accelerations"),
+    ):
+        other = replace(plan, motion=replace(motion, **changes))
+        with pytest.raises(RefusalError) as refusal:
+            check_followed(Rows(log, other), problem, exact=True)
+        assert refusal.value.where.startswith(where)
 
 
 def test_a_motion_is_for_an_ideal_team_that_is_not_held() -> None:

@@ -480,7 +480,7 @@ def test_a_plan_with_a_motion_is_verified_and_says_what_is_proved(base):
     assert len(names) == 5
     assert set(names) <= {check.name for check in verified.checks}
     assert "the motion leads from start to goal" in verified.proved
-    assert "that a team follows the motion" in verified.not_proved
+    assert "that an ideal team, for which alone the motion is planned, follows it" in verified.not_proved
     at_rest = verify_plan(replace(plan, motion=None), problem, gains)
     assert at_rest.proved.endswith("in any state of the cells, which lead from start to goal")
     assert not any("motion" in check.name for check in at_rest.checks)

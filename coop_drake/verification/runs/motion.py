@@ -45,11 +45,11 @@ def check_followed(rows: Rows, problem: PlanningProblem, *, exact: bool) -> list
     entered, windows = log.times[rows.entries], motion.windows
     late, left = entered - windows[1:, 0], windows[:-1, 1] - entered
     for k in np.flatnonzero((late < -SAME) | (left < -SAME)):
-        text = f"is entered at {entered[k]:.9g} s; the motion overlaps it from {windows[k + 1, 0]:.9g} s"
+        text = f"is entered at {entered[k]:.9g} s; the motion is in both cells from {windows[k + 1, 0]:.9g} s"
         raise RefusalError(f"cell_index[{rows.entries[k]}]", f"cell {k + 1} {text} to {windows[k, 1]:.9g} s")
     name = "cells were entered while the motion lay in both cells"
     checks.append(
-        Check(name, len(entered), float(left.min(initial=np.inf)), "s before the older one is left, least")
+        Check(name, len(entered), float(left.min(initial=np.inf)), "s, least time left in the earlier cell")
     )
     away = float(np.hypot(*(rows.z[:, :2] - nominal[:, :2]).T).max())
     turned = float(np.abs(rows.z[:, 2:] - nominal[:, 2:]).max())
