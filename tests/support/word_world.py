@@ -1,0 +1,370 @@
+"""Worlds of words: late, lost and reordered ones between robots and a supervisor with clocks of their own."""
+
+from __future__ import annotations
+
+from itertools import product
+from math import inf
+from typing import NamedTuple
+
+import numpy as np
+
+from coop_drake.jit import compiled
+from coop_drake.laws import words as w
+
+DEAF, MUTE, CUT, DEAD, FORGETS = range(5)
+"""Faults of a robot or the supervisor (the last row): it hears nothing, nothing that it says is heard, both; it
+does nothing any more; it forgets all that it knows (the supervisor alone)."""
+
+(ARRIVAL, SPREAD, MOVING_SPREAD, NOWHERE, BEYOND, LIES, ROUGH, UNEQUAL, STARTS, HELD_EPOCHS, SLOWEST, OVERRUN) = range(12)
+"""What a run gives: when it arrived; the largest difference of phases, at any time and over all pairs that are
+in the same epoch and both alive; in how many periods no cell held all; in how many periods a robot was beyond the
+cells that all allowed; or before a cell that it said to have begun; or its pace was not continuous or its rate out
+of bounds; in how many epochs robots came to rest at different phases; numbers of epochs and of those with holds;
+longest time in which nothing moved; and by how much a robot was beyond x_P of what it had heard at most."""
+
+
+def schedule_of_steps(clock_error=0.0, delay=1.0, plan=0):
+    """Three cells for whole steps of time."""
+    return w.schedule_of(
+        np.array([0.0, 8.0, 18.0]), np.array([0.0, 8.0, 18.0]), np.array([9.0, 17.0]), np.array([12.0, 21.0, 26.0]),
+        ramp=0.5, start_rate=50.0, period=1.0, delay=delay, clock_error=clock_error, plan=plan,
+    )  # fmt: skip
+
+
+def even_schedule(cells, *, delay=0.05, period=0.005, clock_error=0.002, start_rate=1.0 / 0.74):
+    """Cells of 0.5 s; a way along which 0.74 m/s are stopped at 1 m/s^2."""
+    window = delay + 2.0 * clock_error + 2.0 * period
+    begins = 0.7 * np.arange(cells)
+    brakes = begins + 2.0 * window + 0.02
+    return w.schedule_of(
+        begins, begins, brakes[:-1], np.append(brakes[:-1] + 0.74, begins[-1] + 1.5), ramp=0.1,
+        start_rate=start_rate, period=period, delay=delay, clock_error=clock_error,
+    )  # fmt: skip
+
+
+def random_schedule(generator, cells, *, delay=0.05, period=0.01, clock_error=0.002):
+    """Cells of all lengths, with short and long overlaps."""
+    window = delay + 2.0 * clock_error + 2.0 * period
+    begins = np.append(0.0, np.cumsum(generator.uniform(0.08, 0.5, cells - 1)))
+    entries = begins - np.append(0.0, generator.uniform(0.0, 0.06, cells - 1))
+    brakes = np.maximum.accumulate(
+        begins + 2.0 * window + generator.choice([0.0, 1.0]) * generator.uniform(0, 0.2, cells)
+    )
+    brakes += 1e-4 * np.arange(cells)
+    ends = np.append(begins[1:], begins[-1] + 0.5) + generator.uniform(2.0 * clock_error, 0.4, cells)
+    ends = np.maximum.accumulate(np.maximum(ends, brakes + generator.uniform(0.03, 0.6, cells)))
+    ends += 1e-4 * np.arange(cells)
+    return w.schedule_of(
+        entries, begins, brakes[: cells - generator.integers(2)], ends, ramp=generator.uniform(0.02, 0.2),
+        start_rate=generator.uniform(0.7, 4.0), period=period, delay=delay, clock_error=clock_error,
+    )  # fmt: skip
+
+
+@compiled
+def run(
+    schedule, first_words, again_words, clocks, offsets, delay, loss, faults, alarms, pauses, limit, ends_with_rest,
+    seed,
+):  # fmt: skip
+    """Run a team and return what ``ARRIVAL`` and the others name.
+
+    Args:
+        schedule: Its schedule.
+        first_words: What all know first.
+        again_words: What a supervisor knows that was started again.
+        clocks: Of everybody: a clock is wrong by eps cos(a + b t), rows (a, b).
+        offsets: When everybody samples in a period, as a share of it.
+        delay: Largest delay [s]. A word whose repeats are all lost or late for longer arrives after just this time.
+        loss: Share of words that are lost [-].
+        faults: Rows (fault, row of the one, begin, end).
+        alarms: Rows (robot, alarm, begin, end).
+        pauses: Rows (begin, end) in which nobody wants the team to go on.
+        limit: When to give up [s].
+        ends_with_rest: Whether to stop as soon as all that live rest for a second.
+        seed: Of random numbers.
+    """
+    np.random.seed(seed)
+    nodes, period, cells = first_words.shape[0], schedule.period, schedule.ends.size
+    robots = nodes - 1
+    slots = int(delay / period) + 4
+    words = np.empty((nodes, nodes, w.WORD_SIZE))
+    motions, episodes = np.zeros((robots, w.MOTION_SIZE)), np.zeros((robots, w.MOTION_SIZE))
+    for node in range(nodes):
+        words[node] = first_words
+    for k in range(robots):
+        motions[k, w.BEGIN] = motions[k, w.BRAKE_AT] = inf
+        motions[k, w.ORIGIN] = motions[k, w.FIRST] = first_words[k, w.PHASE]
+        episodes[k] = motions[k]
+    said, boxes = np.full((nodes, slots), -inf), np.zeros((nodes, slots, w.WORD_SIZE))
+    due, taken = np.full((nodes, nodes, slots), inf), np.ones((nodes, nodes, slots), np.bool_)
+    order, found, phases = np.argsort(offsets), np.zeros(12), np.zeros(robots)
+    found[ARRIVAL] = inf
+    now, before = np.zeros((robots, 3)), np.zeros((robots, 3))
+    forgot, code, still = np.zeros(len(faults), np.bool_), 0, 0.0
+    hardest = schedule.start_rate
+    for i in range(cells):
+        h = schedule.ends[i] - schedule.brakes[i]
+        if i == 0 or schedule.brakes[i] > schedule.brakes[i - 1]:
+            hardest = max(hardest, 1.0 / (2.0 * h - min(schedule.ramp, h)))
+    for m in range(int(limit / period)):
+        for node in order:
+            t = (m + offsets[node]) * period
+            clock = t + schedule.clock_error * np.cos(clocks[node, 0] + clocks[node, 1] * t)
+            deaf, mute, dead = False, False, False
+            for i in range(len(faults)):
+                fault = int(faults[i, 0])
+                if int(faults[i, 1]) == node and faults[i, 2] <= t < faults[i, 3]:
+                    deaf, mute = deaf or fault in (DEAF, CUT), mute or fault in (MUTE, CUT)
+                    dead = dead or fault == DEAD
+                    if fault == FORGETS and not forgot[i]:
+                        forgot[i] = True
+                        words[node] = again_words
+            if dead:
+                continue
+            for sender in range(nodes):
+                newest = -1
+                for slot in range(slots):
+                    if said[sender, slot] <= t - delay and (newest < 0 or said[sender, slot] > said[sender, newest]):
+                        newest = slot
+                for slot in range(slots):
+                    if taken[sender, node, slot] or (due[sender, node, slot] > t and slot != newest):
+                        continue
+                    taken[sender, node, slot] = True
+                    if not deaf:
+                        w.hear(words[node], sender, boxes[sender, slot])
+            if node < robots:
+                alarm = w.QUIET
+                for i in range(len(alarms)):
+                    if int(alarms[i, 0]) == node and alarms[i, 2] <= t < alarms[i, 3]:
+                        alarm = max(alarm, int(alarms[i, 1]))
+                begin, origin, epoch = motions[node, w.BEGIN], motions[node, w.ORIGIN], words[node, node, w.EPOCH]
+                before[node] = now[node]
+                now[node, 0], now[node, 1], now[node, 2] = w.robot_step(
+                    schedule, clock, alarm, node, motions[node], words[node]
+                )
+                own = words[node, node]
+                if motions[node, w.BEGIN] < inf:
+                    episodes[node] = motions[node]
+                elif begin < inf:
+                    episodes[node] = motions[node]
+                    episodes[node, w.BEGIN], episodes[node, w.ORIGIN] = begin, origin
+                if own[w.EPOCH] > epoch:
+                    found[STARTS] = max(found[STARTS], own[w.EPOCH])
+                # Pace and phase from sample to sample, and the bounds of the rate.
+                step = period * (1.0 + 1e-3) + 1e-9
+                rough = now[node, 0] < before[node, 0] - 1e-12 or now[node, 0] > before[node, 0] + step
+                rough = rough or not -hardest - 1e-9 <= now[node, 2]
+                rough = rough or not now[node, 2] <= schedule.start_rate * (1.0 - now[node, 1] ** 2) + 1e-9
+                rough = rough or abs(now[node, 1] - before[node, 1]) > hardest * 1.001 * step
+                if rough and own[w.HOLD] > -inf and m > 0:
+                    # At the end the motion itself is at rest, whatever the pace.
+                    found[ROUGH] += 1.0 if now[node, 0] < schedule.ends[-1] else 0.0
+                may = 1 + int(max(words[node, :robots, w.CELL].min(), words[node, robots, w.CELL]))
+                found[OVERRUN] = max(found[OVERRUN], now[node, 0] - schedule.ends[min(may, cells - 1)])
+                found[LIES] += 1.0 if now[node, 0] < schedule.begins[int(own[w.CELL])] else 0.0
+            else:
+                wanted = True
+                for i in range(len(pauses)):
+                    wanted = wanted and not pauses[i, 0] <= t < pauses[i, 1]
+                code = w.supervisor_step(schedule, clock, wanted, words[node])[0]
+                if code == w.ARRIVED and found[ARRIVAL] == inf:
+                    found[ARRIVAL] = t
+            slot = m % slots
+            boxes[node, slot], said[node, slot] = words[node, node], t
+            for receiver in range(nodes):
+                taken[node, receiver, slot] = mute or receiver == node
+                lost = np.random.random() < loss
+                due[node, receiver, slot] = inf if lost else t + delay * np.random.random()
+        # What holds at the instant m T, when everybody has decided about it.
+        t, low, high, least, moving = m * period, inf, -inf, inf, False
+        resting, lowest_rest, highest_rest = 0, inf, -inf
+        alive = 0
+        for k in range(robots):
+            gone = False
+            for i in range(len(faults)):
+                gone = gone or (int(faults[i, 0]) == DEAD and int(faults[i, 1]) == k and faults[i, 2] <= t)
+            least = min(least, words[k, k, w.CELL])
+            clock = t + schedule.clock_error * np.cos(clocks[k, 0] + clocks[k, 1] * t)
+            phases[k] = w.phase_at(schedule, episodes[k], clock)[0]
+            if words[k, k, w.KIND] == w.REST:
+                phases[k] = min(phases[k], words[k, k, w.PHASE])
+            if gone:
+                continue
+            alive += 1
+            moving = moving or now[k, 1] > 0.0
+            low, high = min(low, phases[k]), max(high, phases[k])
+            if words[k, k, w.KIND] == w.REST and words[k, k, w.EPOCH] == words[0, 0, w.EPOCH]:
+                resting += 1
+                lowest_rest, highest_rest = (
+                    min(lowest_rest, words[k, k, w.PHASE]), max(highest_rest, words[k, k, w.PHASE])
+                )  # fmt: skip
+            if words[k, k, w.HOLD] < inf:
+                found[HELD_EPOCHS] += 1.0
+        common = False
+        for i in range(cells):
+            common = common or (schedule.entries[i] <= low and high <= schedule.ends[i])
+        found[NOWHERE] += 1.0 if not common else 0.0
+        found[SPREAD] = max(found[SPREAD], high - low)
+        found[BEYOND] += 1.0 if high > schedule.ends[min(int(least) + 1, cells - 1)] + 1e-12 else 0.0
+        found[UNEQUAL] += 1.0 if resting == alive and highest_rest > lowest_rest else 0.0
+        still = 0.0 if moving else still + period
+        found[SLOWEST] = max(found[SLOWEST], still)
+        if code == w.ARRIVED or (ends_with_rest and still > 1.0):
+            break
+    return found
+
+
+def run_world(schedule, seed, *, robots=3, delay=0.05, loss=0.2, faults=(), alarms=(), pauses=(), limit=30.0,
+              even_clocks=False, until_rest=False):  # fmt: skip
+    """Run a team in a world drawn from a seed."""
+    generator = np.random.default_rng(seed)
+    clocks = np.zeros((robots + 1, 2))
+    if generator.random() < 0.5:  # as wrong as they may be, for ever
+        clocks[:, 0] = generator.choice([0.0, np.pi], robots + 1)
+    else:  # corrected by a thousandth of their rate at most
+        clocks[:, 0] = generator.uniform(0.0, 2.0 * np.pi, robots + 1)
+        clocks[:, 1] = generator.uniform(0.0, 1e-3 / schedule.clock_error, robots + 1)
+    offsets = generator.uniform(0.0, 1.0, robots + 1) if generator.random() < 0.5 else np.zeros(robots + 1)
+    return run(
+        schedule, w.first_words(schedule, robots), w.first_words(schedule, robots, again=True), clocks, offsets,
+        delay, loss, np.array(faults, float).reshape(-1, 4), np.array(alarms, float).reshape(-1, 4),
+        np.array(pauses, float).reshape(-1, 2), limit, until_rest, seed,
+    )  # fmt: skip
+
+
+# All that can happen to three robots in whole steps of time.
+
+
+class Moment(NamedTuple):
+    """A state of the team and of the words under way.
+
+    Attributes:
+        words: What everybody has heard and says, shape (nodes, nodes, WORD_SIZE).
+        motions: Of the robots, shape (robots, MOTION_SIZE).
+        past: What everybody said a step ago, two steps ago and so on, shape (ages, nodes, WORD_SIZE).
+        broken: Number of what is broken, -1 for nothing yet, -2 for nothing any more.
+        asked: Whether a monitor has asked, so that none asks again.
+    """
+
+    words: np.ndarray
+    motions: np.ndarray
+    past: np.ndarray
+    broken: int
+    asked: bool
+
+    def key(self, now):
+        """Bytes that are the same where all that follows is the same: stamps count only where fitness differs."""
+        words = self.words.copy()
+        past = self.past.copy()
+        same = (past[:, :, w.FIT][:, None, :] == words[None, :, :, w.FIT]).all(axis=0)
+        words[:, :, w.STAMP] = np.where(same, 0.0, words[:, :, w.STAMP])
+        past[:, :, w.STAMP] = 0.0
+        return words.tobytes() + self.motions.tobytes() + past.tobytes() + bytes([self.broken + 2, self.asked])
+
+
+@compiled
+def choices(words, past, passes):
+    """Write which ages of words have different effects on every link; returns them as bits, shape (nodes, nodes)."""
+    nodes, ages = words.shape[0], past.shape[0]
+    bits = np.zeros((nodes, nodes), np.int64)
+    table = np.empty((ages, nodes, w.WORD_SIZE))
+    for sender in range(nodes):
+        for receiver in range(nodes):
+            if sender == receiver or not passes[sender, receiver]:
+                continue
+            for age in range(ages):
+                table[age] = words[receiver]
+                w.hear(table[age], sender, past[age, sender])
+                new = True
+                for other in range(age):
+                    same = True
+                    for i in range(w.WORD_SIZE):
+                        if i != w.STAMP and table[age, sender, i] != table[other, sender, i]:
+                            same = False
+                    new = new and not same
+                if new:
+                    bits[sender, receiver] |= 1 << age
+    return bits
+
+
+@compiled
+def advance(schedule, clocks, step, words, motions, past, picks, alarms, wanted):
+    """Let everybody hear the words of the ages picked (-1 for none), decide and speak; changes all arrays."""
+    nodes, code = words.shape[0], 0
+    for receiver in range(nodes):
+        for sender in range(nodes):
+            if picks[sender, receiver] >= 0:
+                w.hear(words[receiver], sender, past[picks[sender, receiver], sender])
+    for node in range(nodes):
+        clock = step + schedule.clock_error * clocks[node]
+        if node < nodes - 1:
+            w.robot_step(schedule, clock, alarms[node], node, motions[node], words[node])
+        else:
+            code = w.supervisor_step(schedule, clock, wanted, words[node])[0]
+    for age in range(past.shape[0] - 1, 0, -1):
+        past[age] = past[age - 1]
+    for node in range(nodes):
+        past[0, node] = words[node, node]
+    return code
+
+
+def explore(schedule, ages, *, clocks=(0.0, 0.0, 0.0, 0.0), breaks=(), until=0, asks=(), ask_until=0, check=None,
+            horizon=200):  # fmt: skip
+    """Follow all interleavings until all have arrived; returns numbers of states and of steps between them.
+
+    Args:
+        schedule: The schedule, in whole steps.
+        ages: By how many steps words may be old; each link carries any of them at any step.
+        clocks: By how many eps clocks are ahead.
+        breaks: What may break once, at any step, and be repaired at any later one: lists of links.
+        until: The step by which what is broken is repaired.
+        asks: Alarms that one robot's monitor may give once, at any step.
+        ask_until: The last step at which it may.
+        check: Called with every state and its phases.
+        horizon: When everybody must have arrived.
+    """
+    nodes, clocks = 4, np.array(clocks)
+    words = np.array([w.first_words(schedule, 3)] * nodes)
+    start = Moment(words, np.array([w.first_motion()] * 3), np.array([words[0]] * ages), -1, False)
+    layer, states, steps = {start.key(0): start}, 1, 0
+    for step in range(horizon):
+        found = {}
+        for moment in layer.values():
+            broken = [moment.broken]
+            if moment.broken == -1 and step < until:
+                broken += range(len(breaks))
+            elif moment.broken >= 0:
+                broken = [-2] if step >= until else [moment.broken, -2]
+            alarms = [(w.QUIET,) * 3]
+            if asks and not moment.asked and step < ask_until:
+                alarms += [tuple(a if k == one else w.QUIET for k in range(3)) for one in range(3) for a in asks]
+            for now_broken in broken:
+                passes = ~np.eye(nodes, dtype=bool)
+                if now_broken >= 0:
+                    for link in breaks[now_broken]:
+                        passes[link] = False
+                bits = choices(moment.words, moment.past, passes)
+                picks = np.where(bits > 0, 0, -1)
+                open_links = [tuple(link) for link in np.argwhere(bits > 1)]
+                options = [[age for age in range(ages) if bits[link] >> age & 1] for link in open_links]
+                for chosen in product(*options):
+                    for link, age in zip(open_links, chosen, strict=True):
+                        picks[link] = age
+                    for alarm in alarms:
+                        copy = Moment(
+                            moment.words.copy(), moment.motions.copy(), moment.past.copy(), now_broken,
+                            moment.asked or any(alarm),
+                        )  # fmt: skip
+                        code = advance(
+                            schedule, clocks, step, copy.words, copy.motions, copy.past, picks, np.array(alarm), True
+                        )
+                        steps += 1
+                        if check is not None:
+                            check(copy, step, code)
+                        if code == w.ARRIVED:
+                            continue
+                        found.setdefault(copy.key(step), copy)
+        states += len(found)
+        layer = found
+        if not layer:
+            return states, steps
+    raise AssertionError(f"{len(layer)} states had not arrived after {horizon} steps")
