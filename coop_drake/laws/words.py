@@ -405,7 +405,7 @@ def robot_step(
             i = np.searchsorted(brakes, phase)
             if i < cells:
                 own[KIND] = BRAKE
-                motion[BRAKE_AT], motion[END] = min(max(at, last), w), schedule.ends[i]
+                motion[BRAKE_AT], motion[END] = max(at, last), schedule.ends[i]
                 motion[WAY] = schedule.ends[i] - brakes[i]
         motion[LAST] = w
 

@@ -12,8 +12,8 @@ from coop_drake.jit import compiled
 from coop_drake.laws import words as w
 
 DEAF, MUTE, CUT, DEAD, FORGETS = range(5)
-"""Faults of a robot or the supervisor (the last row): it hears nothing, nothing that it says is heard, both; it
-does nothing any more; it forgets all that it knows (the supervisor alone)."""
+"""Faults of a robot or the supervisor (the last row): it hears nothing; nothing that it says reaches anybody; both,
+also of words that are under way; it does nothing any more; it forgets all that it knows (the supervisor alone)."""
 
 (ARRIVAL, SPREAD, MOVING_SPREAD, NOWHERE, BEYOND, LIES, ROUGH, UNEQUAL, STARTS, HELD_EPOCHS, SLOWEST, OVERRUN) = range(12)
 """What a run gives: when it arrived; the largest difference of phases, at any time and over all pairs that are
@@ -31,14 +31,14 @@ def schedule_of_steps(clock_error=0.0, delay=1.0, plan=0):
     )  # fmt: skip
 
 
-def even_schedule(cells, *, delay=0.05, period=0.005, clock_error=0.002, start_rate=1.0 / 0.74):
-    """Cells of 0.5 s; a way along which 0.74 m/s are stopped at 1 m/s^2."""
+def even_schedule(cells, *, spacing=0.4, delay=0.05, period=0.005, clock_error=0.002, plan=0):
+    """Cells that are begun in even times; 0.74 m/s are stopped and reached again at 1 m/s^2."""
     window = delay + 2.0 * clock_error + 2.0 * period
-    begins = 0.7 * np.arange(cells)
-    brakes = begins + 2.0 * window + 0.02
+    begins = spacing * np.arange(cells)
+    brakes = begins + 2.0 * window
     return w.schedule_of(
-        begins, begins, brakes[:-1], np.append(brakes[:-1] + 0.74, begins[-1] + 1.5), ramp=0.1,
-        start_rate=start_rate, period=period, delay=delay, clock_error=clock_error,
+        begins, begins, brakes[:-1], brakes + 0.42, ramp=0.1, start_rate=1.0 / 0.74, period=period, delay=delay,
+        clock_error=clock_error, plan=plan,
     )  # fmt: skip
 
 
@@ -58,6 +58,15 @@ def random_schedule(generator, cells, *, delay=0.05, period=0.01, clock_error=0.
         entries, begins, brakes[: cells - generator.integers(2)], ends, ramp=generator.uniform(0.02, 0.2),
         start_rate=generator.uniform(0.7, 4.0), period=period, delay=delay, clock_error=clock_error,
     )  # fmt: skip
+
+
+@compiled
+def suffers(faults, fault, node, t):
+    """Whether somebody has a fault at a time."""
+    for i in range(len(faults)):
+        if int(faults[i, 0]) == fault and int(faults[i, 1]) == node and faults[i, 2] <= t < faults[i, 3]:
+            return True
+    return False
 
 
 @compiled
@@ -94,12 +103,12 @@ def run(
         motions[k, w.BEGIN] = motions[k, w.BRAKE_AT] = inf
         motions[k, w.ORIGIN] = motions[k, w.FIRST] = first_words[k, w.PHASE]
         episodes[k] = motions[k]
-    said, boxes = np.full((nodes, slots), -inf), np.zeros((nodes, slots, w.WORD_SIZE))
+    boxes = np.zeros((nodes, slots, w.WORD_SIZE))
     due, taken = np.full((nodes, nodes, slots), inf), np.ones((nodes, nodes, slots), np.bool_)
     order, found, phases = np.argsort(offsets), np.zeros(12), np.zeros(robots)
     found[ARRIVAL] = inf
     now, before = np.zeros((robots, 3)), np.zeros((robots, 3))
-    forgot, code, still = np.zeros(len(faults), np.bool_), 0, 0.0
+    forgot, code, still = False, 0, 0.0
     hardest = schedule.start_rate
     for i in range(cells):
         h = schedule.ends[i] - schedule.brakes[i]
@@ -109,28 +118,20 @@ def run(
         for node in order:
             t = (m + offsets[node]) * period
             clock = t + schedule.clock_error * np.cos(clocks[node, 0] + clocks[node, 1] * t)
-            deaf, mute, dead = False, False, False
-            for i in range(len(faults)):
-                fault = int(faults[i, 0])
-                if int(faults[i, 1]) == node and faults[i, 2] <= t < faults[i, 3]:
-                    deaf, mute = deaf or fault in (DEAF, CUT), mute or fault in (MUTE, CUT)
-                    dead = dead or fault == DEAD
-                    if fault == FORGETS and not forgot[i]:
-                        forgot[i] = True
-                        words[node] = again_words
-            if dead:
+            if suffers(faults, DEAD, node, t):
                 continue
+            if suffers(faults, FORGETS, node, t) and not forgot:
+                forgot, words[node] = True, again_words
+            cut = suffers(faults, CUT, node, t)
+            deaf, mute = cut or suffers(faults, DEAF, node, t), cut or suffers(faults, MUTE, node, t)
             for sender in range(nodes):
-                newest = -1
+                oldest = int(np.floor((t - delay) / period - offsets[sender] + 1e-6)) % slots
+                passes = not deaf and not suffers(faults, CUT, sender, t)
                 for slot in range(slots):
-                    if said[sender, slot] <= t - delay and (newest < 0 or said[sender, slot] > said[sender, newest]):
-                        newest = slot
-                for slot in range(slots):
-                    if taken[sender, node, slot] or (due[sender, node, slot] > t and slot != newest):
-                        continue
-                    taken[sender, node, slot] = True
-                    if not deaf:
-                        w.hear(words[node], sender, boxes[sender, slot])
+                    if not taken[sender, node, slot] and (due[sender, node, slot] <= t or slot == oldest):
+                        taken[sender, node, slot] = True
+                        if passes:
+                            w.hear(words[node], sender, boxes[sender, slot])
             if node < robots:
                 alarm = w.QUIET
                 for i in range(len(alarms)):
@@ -169,7 +170,7 @@ def run(
                 if code == w.ARRIVED and found[ARRIVAL] == inf:
                     found[ARRIVAL] = t
             slot = m % slots
-            boxes[node, slot], said[node, slot] = words[node, node], t
+            boxes[node, slot] = words[node, node]
             for receiver in range(nodes):
                 taken[node, receiver, slot] = mute or receiver == node
                 lost = np.random.random() < loss
@@ -179,15 +180,12 @@ def run(
         resting, lowest_rest, highest_rest = 0, inf, -inf
         alive = 0
         for k in range(robots):
-            gone = False
-            for i in range(len(faults)):
-                gone = gone or (int(faults[i, 0]) == DEAD and int(faults[i, 1]) == k and faults[i, 2] <= t)
             least = min(least, words[k, k, w.CELL])
             clock = t + schedule.clock_error * np.cos(clocks[k, 0] + clocks[k, 1] * t)
             phases[k] = w.phase_at(schedule, episodes[k], clock)[0]
             if words[k, k, w.KIND] == w.REST:
                 phases[k] = min(phases[k], words[k, k, w.PHASE])
-            if gone:
+            if suffers(faults, DEAD, k, t):
                 continue
             alive += 1
             moving = moving or now[k, 1] > 0.0
