@@ -49,7 +49,8 @@ also passes holds on: the smallest one that it has heard in its epoch is its own
    behind creeps to sigma_0, from rest to rest, until t_0 - 2 W. Of an epoch in which others rest already, it
    takes no start.
 3. Who lacks a word that lets it pass the phase b says Hold(b), W before it is there: for b = beta_P if cell P
-   has not been begun by all, for b = sigma_0 if not all have taken the start.
+   has not been begun by all, for b = sigma_0 if not all have taken the start, for b = S(2 W) if not all have
+   said that they run. The last one ends the run of a robot that does not hear that a start was called off.
 4. Its monitor asks for a hold at the next brake phase that it reaches in W or later; a departure that grows,
    at the phase that it reaches in W; above the second threshold, without samples, or when its drives'
    watchdog has run out: at once by all drives, Hold(-infinity), which ends in rest where it is. A stamp that
@@ -375,10 +376,11 @@ def robot_step(
         # Words that lack, and what the monitor asks for.
         ahead = started_phase(schedule, first, w + window)
         limit = max(brakes[may], first) if may < cells - 1 else inf
-        if own[KIND] == ARMED:
-            for k in range(robots):
-                if words[k, EPOCH] != own[EPOCH]:
-                    limit = first
+        for k in range(robots):
+            if words[k, EPOCH] != own[EPOCH] or words[k, KIND] < own[KIND]:
+                limit = (
+                    first if own[KIND] == ARMED else min(limit, started_phase(schedule, first, 2.0 * window))
+                )
         if w + window >= 0.0 and ahead >= limit:
             hold = min(hold, limit)
         if alarm == ASKS and w + window > 0.0:

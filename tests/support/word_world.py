@@ -12,15 +12,16 @@ from coop_drake.jit import compiled
 from coop_drake.laws import words as w
 
 DEAF, MUTE, CUT, DEAD, FORGETS = range(5)
-"""Faults of a robot or the supervisor (the last row): it hears nothing; nothing that it says reaches anybody; both,
-also of words that are under way; it does nothing any more; it forgets all that it knows (the supervisor alone)."""
+"""Faults of a robot or the supervisor (the last row): it hears nothing; nothing that it says reaches anybody;
+both, also of words that are under way; it does nothing any more; it forgets all (the supervisor alone)."""
 
-(ARRIVAL, SPREAD, MOVING_SPREAD, NOWHERE, BEYOND, LIES, ROUGH, UNEQUAL, STARTS, HELD_EPOCHS, SLOWEST, OVERRUN) = range(12)
-"""What a run gives: when it arrived; the largest difference of phases, at any time and over all pairs that are
-in the same epoch and both alive; in how many periods no cell held all; in how many periods a robot was beyond the
-cells that all allowed; or before a cell that it said to have begun; or its pace was not continuous or its rate out
-of bounds; in how many epochs robots came to rest at different phases; numbers of epochs and of those with holds;
-longest time in which nothing moved; and by how much a robot was beyond x_P of what it had heard at most."""
+ARRIVAL, SPREAD, NOWHERE, BEYOND, OVERRUN, LIES, ROUGH, UNEQUAL, EPOCHS, HELD, STILL = range(11)
+"""What a run gives: when it arrived [s]; the largest difference of phases of robots that live [s]; in how many
+periods no cell held all of these; how far a robot was beyond x of the cell after the least that all had begun,
+and beyond x_P by what it had heard [s]; in how many samples a robot was before a cell that it said to have
+begun, and its pace was not continuous or its rate out of bounds; in how many periods robots rested at
+different phases; the number of epochs; in how many periods robots had heard of a hold, for each of them; how
+long nothing moved at most [s]."""
 
 
 def schedule_of_steps(clock_error=0.0, delay=1.0, plan=0):
@@ -82,7 +83,7 @@ def run(
         again_words: What a supervisor knows that was started again.
         clocks: Of everybody: a clock is wrong by eps cos(a + b t), rows (a, b).
         offsets: When everybody samples in a period, as a share of it.
-        delay: Largest delay [s]. A word whose repeats are all lost or late for longer arrives after just this time.
+        delay: Largest delay [s]. A word of which no repeat is in time arrives after just this time.
         loss: Share of words that are lost [-].
         faults: Rows (fault, row of the one, begin, end).
         alarms: Rows (robot, alarm, begin, end).
@@ -105,7 +106,7 @@ def run(
         episodes[k] = motions[k]
     boxes = np.zeros((nodes, slots, w.WORD_SIZE))
     due, taken = np.full((nodes, nodes, slots), inf), np.ones((nodes, nodes, slots), np.bool_)
-    order, found, phases = np.argsort(offsets), np.zeros(12), np.zeros(robots)
+    order, found = np.argsort(offsets), np.zeros(11)
     found[ARRIVAL] = inf
     now, before = np.zeros((robots, 3)), np.zeros((robots, 3))
     forgot, code, still = False, 0, 0.0
@@ -137,7 +138,7 @@ def run(
                 for i in range(len(alarms)):
                     if int(alarms[i, 0]) == node and alarms[i, 2] <= t < alarms[i, 3]:
                         alarm = max(alarm, int(alarms[i, 1]))
-                begin, origin, epoch = motions[node, w.BEGIN], motions[node, w.ORIGIN], words[node, node, w.EPOCH]
+                begin, origin = motions[node, w.BEGIN], motions[node, w.ORIGIN]
                 before[node] = now[node]
                 now[node, 0], now[node, 1], now[node, 2] = w.robot_step(
                     schedule, clock, alarm, node, motions[node], words[node]
@@ -148,8 +149,7 @@ def run(
                 elif begin < inf:
                     episodes[node] = motions[node]
                     episodes[node, w.BEGIN], episodes[node, w.ORIGIN] = begin, origin
-                if own[w.EPOCH] > epoch:
-                    found[STARTS] = max(found[STARTS], own[w.EPOCH])
+                found[EPOCHS] = max(found[EPOCHS], own[w.EPOCH])
                 # Pace and phase from sample to sample, and the bounds of the rate.
                 step = period * (1.0 + 1e-3) + 1e-9
                 rough = now[node, 0] < before[node, 0] - 1e-12 or now[node, 0] > before[node, 0] + step
@@ -175,44 +175,38 @@ def run(
                 taken[node, receiver, slot] = mute or receiver == node
                 lost = np.random.random() < loss
                 due[node, receiver, slot] = inf if lost else t + delay * np.random.random()
-        # What holds at the instant m T, when everybody has decided about it.
-        t, low, high, least, moving = m * period, inf, -inf, inf, False
-        resting, lowest_rest, highest_rest = 0, inf, -inf
-        alive = 0
+        # What holds at the instant m T, for which everybody has decided.
+        t, low, high, least, moves, known = m * period, inf, -inf, inf, False, True
+        lowest, highest = inf, -inf
         for k in range(robots):
             least = min(least, words[k, k, w.CELL])
-            clock = t + schedule.clock_error * np.cos(clocks[k, 0] + clocks[k, 1] * t)
-            phases[k] = w.phase_at(schedule, episodes[k], clock)[0]
-            if words[k, k, w.KIND] == w.REST:
-                phases[k] = min(phases[k], words[k, k, w.PHASE])
             if suffers(faults, DEAD, k, t):
                 continue
-            alive += 1
-            moving = moving or now[k, 1] > 0.0
-            low, high = min(low, phases[k]), max(high, phases[k])
-            if words[k, k, w.KIND] == w.REST and words[k, k, w.EPOCH] == words[0, 0, w.EPOCH]:
-                resting += 1
-                lowest_rest, highest_rest = (
-                    min(lowest_rest, words[k, k, w.PHASE]), max(highest_rest, words[k, k, w.PHASE])
-                )  # fmt: skip
-            if words[k, k, w.HOLD] < inf:
-                found[HELD_EPOCHS] += 1.0
+            clock = t + schedule.clock_error * np.cos(clocks[k, 0] + clocks[k, 1] * t)
+            phase, rest = w.phase_at(schedule, episodes[k], clock)[0], words[k, k, w.PHASE]
+            if words[k, k, w.KIND] == w.REST:
+                phase = min(phase, rest)
+                lowest, highest = min(lowest, rest), max(highest, rest)
+            known = known and words[k, k, w.KIND] == w.REST and words[k, k, w.EPOCH] == words[0, 0, w.EPOCH]
+            moves = moves or now[k, 1] > 0.0
+            low, high = min(low, phase), max(high, phase)
+            found[HELD] += 1.0 if words[k, k, w.HOLD] < inf else 0.0
         common = False
         for i in range(cells):
             common = common or (schedule.entries[i] <= low and high <= schedule.ends[i])
-        found[NOWHERE] += 1.0 if not common else 0.0
+        found[NOWHERE] += 0.0 if common else 1.0
         found[SPREAD] = max(found[SPREAD], high - low)
-        found[BEYOND] += 1.0 if high > schedule.ends[min(int(least) + 1, cells - 1)] + 1e-12 else 0.0
-        found[UNEQUAL] += 1.0 if resting == alive and highest_rest > lowest_rest else 0.0
-        still = 0.0 if moving else still + period
-        found[SLOWEST] = max(found[SLOWEST], still)
+        found[BEYOND] = max(found[BEYOND], high - schedule.ends[min(int(least) + 1, cells - 1)])
+        found[UNEQUAL] += 1.0 if known and highest > lowest else 0.0
+        still = 0.0 if moves else still + period
+        found[STILL] = max(found[STILL], still)
         if code == w.ARRIVED or (ends_with_rest and still > 1.0):
             break
     return found
 
 
 def run_world(schedule, seed, *, robots=3, delay=0.05, loss=0.2, faults=(), alarms=(), pauses=(), limit=30.0,
-              even_clocks=False, until_rest=False):  # fmt: skip
+              until_rest=False):  # fmt: skip
     """Run a team in a world drawn from a seed."""
     generator = np.random.default_rng(seed)
     clocks = np.zeros((robots + 1, 2))
@@ -249,19 +243,19 @@ class Moment(NamedTuple):
     broken: int
     asked: bool
 
-    def key(self, now):
-        """Bytes that are the same where all that follows is the same: stamps count only where fitness differs."""
-        words = self.words.copy()
-        past = self.past.copy()
-        same = (past[:, :, w.FIT][:, None, :] == words[None, :, :, w.FIT]).all(axis=0)
-        words[:, :, w.STAMP] = np.where(same, 0.0, words[:, :, w.STAMP])
-        past[:, :, w.STAMP] = 0.0
-        return words.tobytes() + self.motions.tobytes() + past.tobytes() + bytes([self.broken + 2, self.asked])
+    def key(self):
+        """Bytes that are the same where all that follows is: stamps only tell which of two words is newer."""
+        words, past = self.words.copy(), self.past.copy()
+        same = (past[:, None, :, w.FIT] == words[:, :, w.FIT]).all(axis=0)
+        words[:, :, w.STAMP], past[:, :, w.STAMP] = np.where(same, 0.0, words[:, :, w.STAMP]), 0.0
+        return (
+            words.tobytes() + self.motions.tobytes() + past.tobytes() + bytes([self.broken + 2, self.asked])
+        )
 
 
 @compiled
 def choices(words, past, passes):
-    """Write which ages of words have different effects on every link; returns them as bits, shape (nodes, nodes)."""
+    """Return which ages of words have different effects on every link, as bits, shape (nodes, nodes)."""
     nodes, ages = words.shape[0], past.shape[0]
     bits = np.zeros((nodes, nodes), np.int64)
     table = np.empty((ages, nodes, w.WORD_SIZE))
@@ -305,26 +299,53 @@ def advance(schedule, clocks, step, words, motions, past, picks, alarms, wanted)
     return code
 
 
-def explore(schedule, ages, *, clocks=(0.0, 0.0, 0.0, 0.0), breaks=(), until=0, asks=(), ask_until=0, check=None,
-            horizon=200):  # fmt: skip
-    """Follow all interleavings until all have arrived; returns numbers of states and of steps between them.
+@compiled
+def judge(schedule, clocks, step, words, motions):
+    """Return the difference of phases [s], whether a cell holds all, and how far one is beyond its cells [s]."""
+    low, high, least, cells = inf, -inf, inf, schedule.ends.size
+    for k in range(words.shape[0] - 1):
+        phase = w.phase_at(schedule, motions[k], step + schedule.clock_error * clocks[k])[0]
+        low, high, least = min(low, phase), max(high, phase), min(least, words[k, k, w.CELL])
+    common = False
+    for i in range(cells):
+        common = common or (schedule.entries[i] <= low and high <= schedule.ends[i])
+    return high - low, common, high - schedule.ends[min(int(least) + 1, cells - 1)]
+
+
+HORIZON = 150
+"""The step by which everybody must have arrived."""
+
+
+class Explored(NamedTuple):
+    """What can happen: numbers of different states and of steps between them, and the worst of ``judge``."""
+
+    states: int
+    steps: int
+    spread: float
+    nowhere: int
+    beyond: float
+
+
+def explore(
+    schedule, ages, *, timely=(), clocks=(0.0, 0.0, 0.0, 0.0), breaks=(), until=0, asks=(), ask_until=0
+):
+    """Follow all interleavings until all have arrived.
 
     Args:
         schedule: The schedule, in whole steps.
         ages: By how many steps words may be old; each link carries any of them at any step.
+        timely: Links that always carry the newest words.
         clocks: By how many eps clocks are ahead.
         breaks: What may break once, at any step, and be repaired at any later one: lists of links.
         until: The step by which what is broken is repaired.
-        asks: Alarms that one robot's monitor may give once, at any step.
+        asks: Robots and alarms: one of these monitors may give its alarm once, for one step.
         ask_until: The last step at which it may.
-        check: Called with every state and its phases.
-        horizon: When everybody must have arrived.
     """
     nodes, clocks = 4, np.array(clocks)
     words = np.array([w.first_words(schedule, 3)] * nodes)
     start = Moment(words, np.array([w.first_motion()] * 3), np.array([words[0]] * ages), -1, False)
-    layer, states, steps = {start.key(0): start}, 1, 0
-    for step in range(horizon):
+    layer, states, steps, spread, nowhere, beyond = {b"": start}, 1, 0, 0.0, 0, -inf
+    for step in range(HORIZON):
         found = {}
         for moment in layer.values():
             broken = [moment.broken]
@@ -334,35 +355,31 @@ def explore(schedule, ages, *, clocks=(0.0, 0.0, 0.0, 0.0), breaks=(), until=0, 
                 broken = [-2] if step >= until else [moment.broken, -2]
             alarms = [(w.QUIET,) * 3]
             if asks and not moment.asked and step < ask_until:
-                alarms += [tuple(a if k == one else w.QUIET for k in range(3)) for one in range(3) for a in asks]
+                alarms += [tuple(a if k == one else w.QUIET for k in range(3)) for one, a in asks]
             for now_broken in broken:
                 passes = ~np.eye(nodes, dtype=bool)
-                if now_broken >= 0:
-                    for link in breaks[now_broken]:
-                        passes[link] = False
+                for link in breaks[now_broken] if now_broken >= 0 else ():
+                    passes[link] = False
                 bits = choices(moment.words, moment.past, passes)
                 picks = np.where(bits > 0, 0, -1)
-                open_links = [tuple(link) for link in np.argwhere(bits > 1)]
-                options = [[age for age in range(ages) if bits[link] >> age & 1] for link in open_links]
-                for chosen in product(*options):
-                    for link, age in zip(open_links, chosen, strict=True):
+                for link in timely:
+                    bits[link] &= 1
+                links = [tuple(link) for link in np.argwhere(bits > 1)]
+                for chosen in product(
+                    *([age for age in range(ages) if bits[link] >> age & 1] for link in links)
+                ):
+                    for link, age in zip(links, chosen, strict=True):
                         picks[link] = age
                     for alarm in alarms:
-                        copy = Moment(
-                            moment.words.copy(), moment.motions.copy(), moment.past.copy(), now_broken,
-                            moment.asked or any(alarm),
-                        )  # fmt: skip
-                        code = advance(
-                            schedule, clocks, step, copy.words, copy.motions, copy.past, picks, np.array(alarm), True
-                        )
-                        steps += 1
-                        if check is not None:
-                            check(copy, step, code)
-                        if code == w.ARRIVED:
-                            continue
-                        found.setdefault(copy.key(step), copy)
-        states += len(found)
-        layer = found
+                        arrays = moment.words.copy(), moment.motions.copy(), moment.past.copy()
+                        code = advance(schedule, clocks, step, *arrays, picks, np.array(alarm), True)
+                        parted, common, over = judge(schedule, clocks, step, *arrays[:2])
+                        spread, beyond = max(spread, parted), max(beyond, over)
+                        nowhere, steps = nowhere + (not common), steps + 1
+                        if code != w.ARRIVED:
+                            then = Moment(*arrays, now_broken, moment.asked or any(alarm))
+                            found.setdefault(then.key(), then)
+        states, layer = states + len(found), found
         if not layer:
-            return states, steps
-    raise AssertionError(f"{len(layer)} states had not arrived after {horizon} steps")
+            return Explored(states, steps, spread, nowhere, beyond)
+    raise AssertionError(f"{len(layer)} states had not arrived after {HORIZON} steps")
