@@ -24,16 +24,18 @@ V = X', forces likewise. If a convex set of what is allowed contains 0, A and al
 them during the whole start, wherever it begins. The start costs 1 / alpha and never quite ends; after
 20 / alpha the pace is 1 to the last bit.
 
-**Braking** goes on in w, whose rate p falls from 1 to 0 in the time 2 h, h = x_i - beta_i, symmetrically: p'
-falls to -kappa_i within the ramp r and rises to 0 within r, kappa_i = 1 / (2 h - r); a stop shorter than 2 r
-has ramps of h. Half of its time is its way, so w grows by h and sigma by at most h: a stop that begins at
+**Braking** goes on in w, whose rate p falls from 1 to 0 in the time 2 h, symmetrically: p' falls to -k within
+the ramp r and rises to 0 within r, k = 1 / (2 h - r); a stop shorter than 2 r has ramps of h. Half of its
+time is its way: w grows by h, sigma by at most h. At full pace h = x_i - beta_i and k = kappa_i; a stop that
+begins during the start at w_b is as short as k S'(w_b + h) <= kappa_i lets it be. So a stop that begins at
 beta_i or before, with any pace, ends by x_i. With rho = S' p and rho' = S'' p^2 + S' p',
 
 -kappa_i <= rho' <= alpha (1 - rho^2),
 
-also where a stop begins during the start. Pace and acceleration are continuous. What the plan states for the
-phases from beta_(i-1) to x_i, that A, -kappa_i V and A - kappa_i V are allowed, and alpha V for all phases,
-is all that is needed. In the last cell no stop begins after the last brake phase: the motion itself ends.
+also where a stop begins during the start. Pace and acceleration are continuous. It is enough that the plan
+states for the phases from beta_(i-1) to x_i that A, -kappa_i V and A - kappa_i V are allowed, and for all
+phases that alpha V and -alpha V are. In the last cell no stop begins after the last brake phase: the motion
+itself ends.
 
 **Words.** Everybody says all its words anew in every period, as one row: epoch, plan, stamp, kind, cell
 begun, hold, phase, time, fit. In an epoch the kind only advances, the cell only grows and the hold only
@@ -121,7 +123,10 @@ UNKNOWN = -1.0
 """Epoch of a supervisor that was started again during a run."""
 
 ROUNDING = 1e-9
-"""By how much stamps may be ahead of what clocks allow [s]: sums of times round."""
+"""By how much stamps may be ahead of what clocks allow, and a hold too late [s]: sums of times round."""
+
+SHORTENING = 10
+"""Steps in which a stop during a start is made shorter [-]; each way that they give is long enough."""
 
 
 class Schedule(NamedTuple):
@@ -403,12 +408,18 @@ def robot_step(
                     at = better
                     s = tanh(schedule.start_rate * at)
                     better = at - (started_phase(schedule, first, at) - hold) / (s * s)
-            phase = hold if at >= last else started_phase(schedule, first, last)
+            phase = hold
+            if last > at + ROUNDING:  # heard too late
+                at, phase = last, started_phase(schedule, first, last)
             i = np.searchsorted(brakes, phase)
             if i < cells:
-                own[KIND] = BRAKE
-                motion[BRAKE_AT], motion[END] = max(at, last), schedule.ends[i]
-                motion[WAY] = schedule.ends[i] - brakes[i]
+                own[KIND], way = BRAKE, schedule.ends[i] - brakes[i]
+                ramp = min(schedule.ramp, way)
+                time = 2.0 * way - ramp  # 1 / kappa
+                for _ in range(SHORTENING):
+                    s = tanh(schedule.start_rate * (at + way))
+                    way = min(way, 0.5 * (s * s * time + ramp))
+                motion[BRAKE_AT], motion[WAY], motion[END] = at, way, schedule.ends[i]
         motion[LAST] = w
 
     phase, pace, rate = phase_at(schedule, motion, clock)

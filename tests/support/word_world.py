@@ -16,30 +16,31 @@ DEAF, MUTE, CUT, DEAD, FORGETS = range(5)
 both, also of words that are under way; it does nothing any more; it forgets all (the supervisor alone)."""
 
 ARRIVAL, SPREAD, NOWHERE, BEYOND, OVERRUN, LIES, ROUGH, UNEQUAL, EPOCHS, HELD, STILL = range(11)
-"""What a run gives: when it arrived [s]; the largest difference of phases of robots that live [s]; in how many
-periods no cell held all of these; how far a robot was beyond x of the cell after the least that all had begun,
-and beyond x_P by what it had heard [s]; in how many samples a robot was before a cell that it said to have
-begun, and its pace was not continuous or its rate out of bounds; in how many periods robots rested at
+"""What a run gives: when it arrived [s]; the largest difference of phases of robots that live [s]; in how
+many periods no cell held all of these; how far a robot was beyond the cell after the last one that all had
+begun, and beyond cell P by what it had heard [s]; in how many samples a robot was before a cell that it said
+to have begun, and its pace was not continuous or its rate out of bounds; in how many periods robots rested at
 different phases; the number of epochs; in how many periods robots had heard of a hold, for each of them; how
 long nothing moved at most [s]."""
 
 
-def schedule_of_steps(clock_error=0.0, delay=1.0, plan=0):
+def schedule_of_steps(clock_error=0.0, delay=1.0):
     """Three cells for whole steps of time."""
+    begins, brakes, ends = np.array([0.0, 8.0, 18.0]), np.array([9.0, 17.0]), np.array([12.0, 21.0, 26.0])
     return w.schedule_of(
-        np.array([0.0, 8.0, 18.0]), np.array([0.0, 8.0, 18.0]), np.array([9.0, 17.0]), np.array([12.0, 21.0, 26.0]),
-        ramp=0.5, start_rate=50.0, period=1.0, delay=delay, clock_error=clock_error, plan=plan,
+        begins, begins, brakes, ends, ramp=0.5, start_rate=50.0, period=1.0, delay=delay,
+        clock_error=clock_error,
     )  # fmt: skip
 
 
-def even_schedule(cells, *, spacing=0.4, delay=0.05, period=0.005, clock_error=0.002, plan=0):
+def even_schedule(cells, *, delay=0.05, period=0.005, clock_error=0.002, start_rate=1.0 / 0.74):
     """Cells that are begun in even times; 0.74 m/s are stopped and reached again at 1 m/s^2."""
     window = delay + 2.0 * clock_error + 2.0 * period
-    begins = spacing * np.arange(cells)
+    begins = 0.4 * np.arange(cells)
     brakes = begins + 2.0 * window
     return w.schedule_of(
-        begins, begins, brakes[:-1], brakes + 0.42, ramp=0.1, start_rate=1.0 / 0.74, period=period, delay=delay,
-        clock_error=clock_error, plan=plan,
+        begins, begins, brakes[:-1], brakes + 0.42, ramp=0.1, start_rate=start_rate, period=period,
+        delay=delay, clock_error=clock_error,
     )  # fmt: skip
 
 
@@ -62,6 +63,15 @@ def random_schedule(generator, cells, *, delay=0.05, period=0.01, clock_error=0.
 
 
 @compiled
+def sample(schedule, motion, times):
+    """Return the phases, paces and their rates of a robot, shape (3, times)."""
+    found = np.empty((3, times.size))
+    for i in range(times.size):
+        found[0, i], found[1, i], found[2, i] = w.phase_at(schedule, motion, times[i])
+    return found
+
+
+@compiled
 def suffers(faults, fault, node, t):
     """Whether somebody has a fault at a time."""
     for i in range(len(faults)):
@@ -72,8 +82,8 @@ def suffers(faults, fault, node, t):
 
 @compiled
 def run(
-    schedule, first_words, again_words, clocks, offsets, delay, loss, faults, alarms, pauses, limit, ends_with_rest,
-    seed,
+    schedule, first_words, again_words, clocks, offsets, delay, loss, faults, alarms, pauses, limit,
+    until_rest, seed,
 ):  # fmt: skip
     """Run a team and return what ``ARRIVAL`` and the others name.
 
@@ -89,10 +99,10 @@ def run(
         alarms: Rows (robot, alarm, begin, end).
         pauses: Rows (begin, end) in which nobody wants the team to go on.
         limit: When to give up [s].
-        ends_with_rest: Whether to stop as soon as all that live rest for a second.
+        until_rest: Whether to stop as soon as all that live rest for a second.
         seed: Of random numbers.
     """
-    np.random.seed(seed)
+    np.random.seed(seed)  # noqa: NPY002 - numba's own
     nodes, period, cells = first_words.shape[0], schedule.period, schedule.ends.size
     robots = nodes - 1
     slots = int(delay / period) + 4
@@ -173,8 +183,8 @@ def run(
             boxes[node, slot] = words[node, node]
             for receiver in range(nodes):
                 taken[node, receiver, slot] = mute or receiver == node
-                lost = np.random.random() < loss
-                due[node, receiver, slot] = inf if lost else t + delay * np.random.random()
+                lost, age = np.random.random() < loss, delay * np.random.random()  # noqa: NPY002
+                due[node, receiver, slot] = inf if lost else t + age
         # What holds at the instant m T, for which everybody has decided.
         t, low, high, least, moves, known = m * period, inf, -inf, inf, False, True
         lowest, highest = inf, -inf
@@ -200,7 +210,7 @@ def run(
         found[UNEQUAL] += 1.0 if known and highest > lowest else 0.0
         still = 0.0 if moves else still + period
         found[STILL] = max(found[STILL], still)
-        if code == w.ARRIVED or (ends_with_rest and still > 1.0):
+        if code == w.ARRIVED or (until_rest and still > 1.0):
             break
     return found
 
@@ -215,11 +225,11 @@ def run_world(schedule, seed, *, robots=3, delay=0.05, loss=0.2, faults=(), alar
     else:  # corrected by a thousandth of their rate at most
         clocks[:, 0] = generator.uniform(0.0, 2.0 * np.pi, robots + 1)
         clocks[:, 1] = generator.uniform(0.0, 1e-3 / schedule.clock_error, robots + 1)
-    offsets = generator.uniform(0.0, 1.0, robots + 1) if generator.random() < 0.5 else np.zeros(robots + 1)
+    offsets = generator.choice([0.0, 1.0]) * generator.uniform(0.0, 1.0, robots + 1)
+    known = w.first_words(schedule, robots), w.first_words(schedule, robots, again=True)
     return run(
-        schedule, w.first_words(schedule, robots), w.first_words(schedule, robots, again=True), clocks, offsets,
-        delay, loss, np.array(faults, float).reshape(-1, 4), np.array(alarms, float).reshape(-1, 4),
-        np.array(pauses, float).reshape(-1, 2), limit, until_rest, seed,
+        schedule, *known, clocks, offsets, delay, loss, np.array(faults, float).reshape(-1, 4),
+        np.array(alarms, float).reshape(-1, 4), np.array(pauses, float).reshape(-1, 2), limit, until_rest, seed,
     )  # fmt: skip
 
 
@@ -383,3 +393,80 @@ def explore(
         if not layer:
             return Explored(states, steps, spread, nowhere, beyond)
     raise AssertionError(f"{len(layer)} states had not arrived after {HORIZON} steps")
+
+
+class Team:
+    """A team whose words take one step, on links that a test may close.
+
+    Args:
+        schedule: The schedule.
+        phases: Where the robots rest.
+        again: Whether the supervisor was started again.
+
+    Attributes:
+        closed: Links (sender, receiver) that carry nothing; the supervisor is the last one.
+        alarms: What the robots' monitors say.
+        wanted: Whether the team shall go on.
+        gone: Who does nothing any more.
+        clocks: By how many eps clocks are ahead.
+        code: What the supervisor sees, and the robot that it is about.
+    """
+
+    def __init__(self, schedule, phases, again=False):
+        self.schedule, self.robots = schedule, len(phases)
+        nodes = self.robots + 1
+        known = w.first_words(schedule, self.robots)
+        known[: self.robots, w.PHASE] = phases
+        for k, phase in enumerate(phases):
+            known[k, w.CELL] = np.searchsorted(schedule.begins, phase, side="right") - 1
+        self.words, self.motions = np.array([known] * nodes), np.array([w.first_motion(p) for p in phases])
+        if again:
+            self.words[-1] = w.first_words(schedule, self.robots, again=True)
+        self.past = self.words[0][None].copy()
+        self.closed, self.gone, self.clocks = set(), set(), np.zeros(nodes)
+        self.alarms, self.wanted, self.code, self.number = [w.QUIET] * self.robots, True, (w.GOES, -1), 0
+
+    @property
+    def time(self):
+        """Time of the next step."""
+        return self.number * self.schedule.period
+
+    @property
+    def kinds(self):
+        """What the robots do."""
+        return [self.words[k, k, w.KIND] for k in range(self.robots)]
+
+    @property
+    def phases(self):
+        """Where the robots are after the last step."""
+        return np.array([motion[0] for motion in self.now])
+
+    def step(self):
+        """Let all hear, decide and speak."""
+        nodes, said = self.robots + 1, self.past[0].copy()
+        self.now = getattr(self, "now", None) or [(0.0, 0.0, 0.0)] * self.robots
+        for node in range(nodes):
+            if node in self.gone:
+                continue
+            for sender in range(nodes):
+                if sender != node and not {(sender, node)} & self.closed:
+                    w.hear(self.words[node], sender, said[sender])
+            clock = self.time + self.clocks[node] * self.schedule.clock_error
+            own = self.words[node]
+            if node < self.robots:
+                self.now[node] = w.robot_step(
+                    self.schedule, clock, self.alarms[node], node, self.motions[node], own
+                )
+            else:
+                self.code = w.supervisor_step(self.schedule, clock, self.wanted, own)
+            self.past[0, node] = own[node]
+        self.number += 1
+        return self.now
+
+    def until(self, condition, limit=30.0):
+        """Go on until a condition holds; returns phases, paces and their rates, shape (steps, robots, 3)."""
+        rows, end = [], self.time + limit
+        while not condition(self):
+            assert self.time < end, f"not within {limit} s; the supervisor sees {self.code}"
+            rows.append(list(self.step()))
+        return np.array(rows)

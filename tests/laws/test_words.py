@@ -1,0 +1,555 @@
+"""Words of a team that does not stop: its phases, and what holds whatever is late or lost."""
+
+from math import inf, isfinite
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from coop_drake.laws import words as w
+from tests.support import word_world as world
+from tests.support.word_world import (
+    Team,
+    even_schedule,
+    explore,
+    random_schedule,
+    run_world,
+    schedule_of_steps,
+)
+
+EPS = 0.002
+ROUNDING = 1e-9
+WINDOW = 0.05 + 2.0 * EPS + 2.0 * 0.005
+
+
+def arrived(team):
+    return team.code[0] == w.ARRIVED
+
+
+def all_are(kind):
+    return lambda team: all(one == kind for one in team.kinds)
+
+
+# What a schedule must keep.
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"brakes": [0.127, 0.6]}, "brake phase of cell 0 must be at least 0.128 s after"),
+        (
+            {"brakes": [0.3, 1.1]},
+            "brake phase of cell 1 must be at least 0.128 s after its begin, and before",
+        ),
+        ({"entries": [0.0, 0.597, 0.8]}, "cells 0 and 1 must overlap for at least 0.004 s"),
+        ({"entries": [0.0, 0.41, 0.8]}, "cell 1 must be begun after its entry"),
+        ({"begins": [0.0, 0.61, 0.8]}, "cell 0 must be begun after its entry, and be left after the next"),
+        ({"begins": [0.1, 0.4, 0.8]}, "cell 0 must be entered and begun at phase 0"),
+        ({"brakes": [0.3, 0.6, 1.6]}, "last brake phase must be before the motion's end"),
+        ({"ends": [0.6, 1.0]}, "of every cell"),
+        ({"start_rate": 0.0}, "must be positive"),
+    ],
+)
+def test_a_schedule_that_the_guarantees_do_not_hold_for_is_refused(change, message):
+    given = {
+        "entries": [0.0, 0.4, 0.8], "begins": [0.0, 0.4, 0.8], "brakes": [0.3, 0.6], "ends": [0.6, 1.0, 1.5],
+        "ramp": 0.1, "start_rate": 1.0, "period": 0.005, "delay": 0.05, "clock_error": EPS,
+    }  # fmt: skip
+    assert w.schedule_of(**given).window == pytest.approx(WINDOW)
+    with pytest.raises(ValueError, match=message):
+        w.schedule_of(**{**given, **change})
+
+
+# Phase, pace and its rate.
+
+
+def profile(motion, schedule, begin, end, steepest):
+    """Sample a motion, whose columns are integrals of each other, and rho'' at most ``steepest``."""
+    times = np.linspace(begin, end, 20001)
+    phase, pace, rate = world.sample(schedule, motion, times)
+    step = times[1] - times[0]
+    for value, slope in ((phase, pace), (pace, rate)):
+        sums = np.append(0.0, np.cumsum(0.5 * (slope[1:] + slope[:-1]) * step))
+        np.testing.assert_allclose(value - value[0], sums, atol=step**2 * steepest * (1.0 + end - begin))
+    assert np.abs(np.diff(rate)).max() <= 1.01 * steepest * step
+    return times, phase, pace, rate
+
+
+def motion_of(schedule, first=0.0, *, brake_at=inf, cell=0, origin=None, creep=0.0):
+    motion = w.first_motion(first)
+    motion[w.BEGIN], motion[w.BRAKE_AT] = 0.0, brake_at
+    motion[w.WAY], motion[w.END] = schedule.ends[cell] - schedule.brakes[cell], schedule.ends[cell]
+    motion[w.ORIGIN], motion[w.CREEP] = first if origin is None else origin, creep
+    return motion
+
+
+def long_schedule(ramp=0.1, start_rate=1.0, way=0.5):
+    """One stop far from all other events."""
+    brakes = np.array([50.0, 100.0])
+    return w.schedule_of(
+        [0.0, 40.0], [0.0, 40.0], brakes[:1], [50.0 + way, 200.0], ramp=ramp, start_rate=start_rate,
+        period=0.005, delay=0.05, clock_error=EPS,
+    )  # fmt: skip
+
+
+RATES = st.floats(0.3, 5.0)
+
+
+@settings(max_examples=25)
+@given(RATES, st.floats(0.0, 30.0))
+def test_a_start_costs_one_over_its_rate_and_leaves_room_for_the_acceleration_of_the_motion(rate, first):
+    schedule = long_schedule(start_rate=rate)
+    times, phase, pace, slope = profile(motion_of(schedule, first), schedule, 0.0, 20.0 / rate, 2.0 * rate**2)
+    assert (phase[0], pace[0], slope[0]) == (first, 0.0, 0.0)
+    assert (slope >= 0.0).all()
+    assert (slope <= rate * (1.0 - pace**2) + ROUNDING).all()
+    assert pace[-1] == pytest.approx(1.0, abs=1e-15)
+    assert phase[-1] == pytest.approx(first + times[-1] - 1.0 / rate)
+
+
+@settings(max_examples=40)
+@given(RATES, st.floats(0.01, 0.4), st.floats(0.02, 2.0), st.floats(0.0, 20.0))
+def test_a_stop_that_begins_at_any_time_keeps_its_rate_and_ends_within_its_way(rate, ramp, way, at):
+    schedule = long_schedule(ramp, rate, way)
+    motion = motion_of(schedule, brake_at=at)
+    kappa = 1.0 / (2.0 * way - min(ramp, way))
+    steepest = kappa / min(ramp, way) + 2.0 * rate * kappa + 2.0 * rate**2
+    times, phase, pace, slope = profile(motion, schedule, max(at - 0.5, 0.0), at + 2.0 * way + 0.1, steepest)
+    assert (slope >= -kappa - ROUNDING).all()
+    assert (slope <= rate * (1.0 - pace**2) + ROUNDING).all()
+    assert ((pace >= 0.0) & (pace <= 1.0)).all()
+    assert (pace[times > at + 2.0 * way + ROUNDING] == 0.0).all()
+    begin = w.phase_at(schedule, motion, at)[0]
+    assert begin <= phase[-1] <= begin + way * (1.0 + 1e-12)
+
+
+@pytest.mark.parametrize(("ramp", "way"), [(0.1, 0.5), (0.1, 0.1), (0.1, 0.07)])
+def test_a_stop_from_full_pace_takes_its_time_and_its_way(ramp, way):
+    schedule = long_schedule(ramp, 1.0, way)
+    motion, kappa = motion_of(schedule, brake_at=50.0), 1.0 / (2.0 * way - min(ramp, way))
+    begin = w.phase_at(schedule, motion, 50.0)[0]
+    assert 2.0 * way == pytest.approx(1.0 / kappa + min(ramp, way))
+    assert w.phase_at(schedule, motion, 50.0 + 1.999 * way)[1] > 0.0
+    assert w.phase_at(schedule, motion, 50.0 + 2.0 * way)[:2] == (pytest.approx(begin + way, abs=1e-12), 0.0)
+    middle = w.phase_at(schedule, motion, 50.0 + way)
+    assert middle[1:] == (pytest.approx(0.5), pytest.approx(-kappa))
+
+
+@settings(max_examples=25)
+@given(RATES, st.floats(1e-6, 0.9))
+def test_a_robot_that_creeps_comes_from_rest_to_rest_before_the_start(rate, way):
+    schedule = long_schedule(start_rate=rate)
+    time = w.creep_time(schedule, way)
+    motion, before = motion_of(schedule, 1.0, origin=1.0 - way, creep=time), -2.0 * schedule.window
+    _, phase, pace, slope = profile(motion, schedule, before - 1.01 * time, before, 60.0 * way / time**3)
+    assert (phase[0], pace[0], slope[0]) == (1.0 - way, 0.0, 0.0)
+    assert (pace**2 + np.abs(slope) / rate < 1.0).all()
+    assert w.phase_at(schedule, motion, before) == (1.0, 0.0, 0.0)
+
+
+@settings(max_examples=60)
+@given(st.integers(0, 10**6), st.floats(0.0, 4.0), st.booleans())
+def test_all_accelerations_are_allowed_where_those_are_that_a_plan_states(seed, at, brakes):
+    """In an ellipse about any point that contains zero, such as friction leaves on a slope."""
+    generator = np.random.default_rng(seed)
+    matrix, middle = generator.normal(size=(2, 2)), generator.uniform(-0.6, 0.6, 2)
+
+    def share(vector):
+        return np.linalg.norm(vector @ matrix - middle)
+
+    acceleration, velocity = generator.normal(size=(2, 2))
+    rate, kappa, ramp = *generator.uniform(0.3, 3.0, 2), 0.1
+    way = 0.5 * (1.0 / kappa + ramp)
+    while (
+        max(map(share, (acceleration, rate * velocity, -kappa * velocity, acceleration - kappa * velocity)))
+        > 1
+    ):
+        acceleration, velocity = 0.95 * acceleration, 0.95 * velocity
+    schedule = long_schedule(ramp, rate, way)
+    motion = motion_of(schedule, brake_at=at if brakes else inf)
+    for t in np.linspace(0.0, 8.0, 400):
+        _, pace, slope = w.phase_at(schedule, motion, t)
+        assert share(pace**2 * acceleration + slope * velocity) <= 1.0 + ROUNDING
+
+
+@settings(max_examples=40)
+@given(st.floats(0.001, 0.95), st.sampled_from([0.0, 0.3, 0.41, 0.7]))
+def test_a_robot_brakes_where_a_hold_says_and_rests_before_its_cell_ends(share, first):
+    """From any pace, also just after the start, where the pace is small."""
+    schedule = even_schedule(4)
+    team = Team(schedule, [first])
+    hold = first + share * (schedule.brakes[2] - first)
+    team.until(all_are(w.RUN))
+    team.words[0, 0, w.HOLD] = hold
+    rows = team.until(lambda team: team.motions[0, w.BRAKE_AT] < inf)
+    motion = team.motions[0].copy()
+    found = w.phase_at(schedule, motion, motion[w.BEGIN] + motion[w.BRAKE_AT])[0]
+    assert found == pytest.approx(hold, abs=1e-13)
+    cell = np.searchsorted(schedule.brakes, hold)
+    rows = np.concatenate([rows, team.until(all_are(w.REST))])
+    assert team.words[0, 0, w.PHASE] <= schedule.ends[cell]
+    kappa = 1.0 / (2.0 * (schedule.ends[cell] - schedule.brakes[cell]) - schedule.ramp)
+    assert (rows[:, 0, 2] >= -kappa - ROUNDING).all()
+    # No longer than the pace needs: twice its rate and two ramps.
+    pace = w.phase_at(schedule, motion, motion[w.BEGIN] + motion[w.BRAKE_AT] + motion[w.WAY])[1] * 2.0
+    assert 2.0 * motion[w.WAY] <= max(pace / kappa, schedule.ramp) + 2.0 * schedule.ramp
+
+
+def test_a_stop_at_the_brake_phase_and_full_pace_ends_where_the_cell_does():
+    schedule = even_schedule(6, start_rate=20.0)
+    for cell in range(2, 5):
+        team = Team(schedule, [0.0])
+        team.until(all_are(w.RUN))
+        team.words[0, 0, w.HOLD] = schedule.brakes[cell]
+        team.until(all_are(w.REST))
+        assert schedule.ends[cell] - 1e-12 <= team.words[0, 0, w.PHASE] <= schedule.ends[cell]
+
+
+def test_after_the_last_brake_phase_the_motion_itself_ends():
+    schedule = even_schedule(3)
+    schedule = schedule._replace(brakes=np.append(schedule.brakes[:2], schedule.brakes[1]))
+    for later, end in ((-0.01, schedule.ends[1]), (0.01, schedule.ends[2])):
+        team = Team(schedule, [0.0])
+        team.until(all_are(w.RUN))
+        team.words[0, 0, w.HOLD] = schedule.brakes[1] + later
+        team.until(all_are(w.REST))
+        assert 0.9 * end < team.words[0, 0, w.PHASE] <= end
+    assert team.words[0, 0, w.PHASE] == schedule.ends[2]
+
+
+# Words.
+
+
+@settings(max_examples=50)
+@given(st.integers(0, 10**6))
+def test_order_loss_and_repetition_of_words_do_not_matter_once_the_newest_has_come(seed):
+    generator = np.random.default_rng(seed)
+    schedule, team = even_schedule(4), None
+    team = Team(schedule, [0.0, 0.0])
+    said = []
+    while not arrived(team):
+        team.alarms[1] = w.GROWS if 1.0 < team.time < 1.1 else w.QUIET
+        team.step()
+        said.append(team.past[0].copy())
+    until = generator.integers(1, len(said))
+    for sender in range(3):
+        heard = w.first_words(schedule, 2)
+        order = generator.integers(0, until, generator.integers(1, 30))
+        for index in [*order, until - 1, *order]:
+            w.hear(heard, sender, said[index][sender])
+        np.testing.assert_array_equal(heard[sender], said[until - 1][sender])
+
+
+def test_words_of_another_plan_and_of_an_epoch_that_is_over_are_not_heard():
+    schedule = even_schedule(3)
+    words = w.first_words(schedule, 2)
+    words[0, w.EPOCH] = 2.0
+    before = words.copy()
+    for change in ({w.PLAN: 1.0, w.EPOCH: 3.0}, {w.EPOCH: 1.0}):
+        word = before[0].copy()
+        word[w.CELL], word[w.HOLD], word[w.STAMP] = 2.0, 0.1, 5.0
+        for column, value in change.items():
+            word[column] = value
+        w.hear(words, 0, word)
+        np.testing.assert_array_equal(words, before)
+
+
+# The team.
+
+
+def test_nobody_waits_and_all_arrive_in_the_time_of_the_motion_and_one_start():
+    schedule = even_schedule(8)
+    team = Team(schedule, [0.0] * 3)
+    rows = team.until(arrived)
+    moving = schedule.period * (rows[:, 0, 1] > 0.0).sum()
+    assert moving == pytest.approx(schedule.ends[-1] + 1.0 / schedule.start_rate, abs=0.01)
+    assert team.time - moving < 3.0 * schedule.window + 0.05
+    assert (team.words[:, :, w.HOLD] == inf).all()
+    assert (rows[:, 0] == rows[:, 1]).all()
+
+
+def test_robots_that_rest_apart_creep_to_the_one_in_front_and_go_on_together():
+    schedule = even_schedule(6)
+    phases = [0.45, 0.3, 0.7]  # in no common cell: cell 0 ends at 0.548, cell 2 is entered at 0.8
+    team = Team(schedule, phases)
+    rows = team.until(all_are(w.RUN))
+    assert rows[-1, :, 0] == pytest.approx([0.7] * 3, abs=1e-6)
+    creeps = schedule.start_rate * (1.0 - rows[:, :, 1] ** 2) - np.abs(rows[:, :, 2])
+    assert (creeps > 0.0).all()
+    assert (rows[:, 2, 0] < 0.7 + 1e-6).all()
+    team.until(arrived)
+
+
+def test_one_that_rests_before_the_goal_creeps_there():
+    schedule = even_schedule(3)
+    end = schedule.ends[-1]
+    team = Team(schedule, [end, end, end - 0.05])
+    team.until(arrived)
+    assert (team.phases == end).all()
+
+
+def test_a_robot_whose_monitor_asks_refuses_the_start_and_the_next_one_is_taken_by_all():
+    schedule = even_schedule(4)
+    team = Team(schedule, [0.0] * 3)
+    team.until(lambda team: team.words[-1, -1, w.EPOCH] == 1.0)  # said, not yet heard
+    team.alarms[1] = w.ASKS
+    team.until(lambda team: team.kinds[1] == w.REST and team.words[1, 1, w.EPOCH] == 1.0)
+    team.until(all_are(w.REST))
+    assert (team.phases == 0.0).all()
+    for _ in range(20):
+        team.step()
+    assert team.code == (w.DEPARTS, 1)
+    team.alarms[1] = w.QUIET
+    team.until(arrived)
+    assert team.words[0, 0, w.EPOCH] == 2.0
+
+
+def test_a_start_that_one_does_not_hear_is_called_off_by_everybody_without_the_supervisor():
+    schedule = even_schedule(4)
+    team = Team(schedule, [0.0] * 3)
+    team.closed = {(3, 2)}
+    team.until(lambda team: team.words[-1, -1, w.EPOCH] == 1.0)
+    team.step()
+    team.gone = {3}
+    team.until(lambda team: team.kinds[:2] == [w.ARMED] * 2)
+    team.until(all_are(w.REST))
+    assert (team.phases == 0.0).all()
+
+
+def test_who_does_not_hear_that_a_start_is_called_off_stops_at_once():
+    """Robot 1 does not hear that robot 0 has taken it; robot 2 hears nothing any more."""
+    schedule = even_schedule(5)
+    team = Team(schedule, [0.0] * 3)
+    team.closed = {(0, 1)}
+    team.until(lambda team: team.kinds == [w.ARMED] * 3)
+    team.until(lambda team: team.time > team.motions[2, w.BEGIN] - schedule.window)
+    team.closed |= {(k, 2) for k in (0, 1, 3)}
+    team.until(lambda team: team.kinds[2] == w.RUN)
+    team.until(all_are(w.REST))
+    assert team.phases[:2].tolist() == [0.0, 0.0]
+    assert 0.0 < team.phases[2] < 0.01
+    team.closed = set()
+    team.until(arrived)
+
+
+@pytest.mark.parametrize("kind", [w.REST, w.ARMED, w.RUN, w.BRAKE])
+@pytest.mark.parametrize("one", [0, 3])
+def test_whatever_a_robot_or_the_supervisor_does_when_it_dies_the_others_come_to_rest_together(kind, one):
+    schedule = even_schedule(6)
+    team = Team(schedule, [0.0] * 3)
+    if kind == w.BRAKE:
+        team.until(lambda team: team.time > 1.5)
+        team.wanted = False
+    team.until(all_are(kind))
+    team.gone = {one}
+    others = [k for k in range(3) if k != one]
+    rows = team.until(lambda team: all(team.kinds[k] == w.REST for k in others) and team.time > 2.0)
+    assert np.ptp(rows[:, others, 0], axis=1).max() == 0.0
+    for _ in range(100):
+        team.step()
+    assert all(team.kinds[k] == w.REST for k in others)
+    if one < 3 and kind in (w.ARMED, w.RUN):
+        # Stopped by the words that lack: within a cell of what the dead robot had begun.
+        assert team.phases[others].max() <= schedule.ends[int(team.words[0, 0, w.CELL]) + 1]
+    assert not arrived(team)
+
+
+def test_a_supervisor_that_was_started_again_learns_where_all_are_and_skips_an_epoch():
+    schedule = even_schedule(6)
+    team = Team(schedule, [0.0] * 3)
+    team.until(lambda team: team.time > 1.5)
+    team.words[-1] = w.first_words(schedule, 3, again=True)
+    team.alarms[0] = w.ASKS
+    team.until(all_are(w.REST))
+    team.alarms[0] = w.QUIET
+    team.until(arrived)
+    assert team.words[0, 0, w.EPOCH] == 3.0
+
+
+def test_the_common_brake_stops_all_at_once_and_a_new_start_ends_it():
+    schedule = even_schedule(6)
+    team = Team(schedule, [0.0] * 3)
+    team.until(lambda team: team.time > 1.5)
+    team.alarms[2] = w.BRAKES
+    team.step()
+    team.step()
+    assert team.kinds == [w.REST] * 3
+    assert [team.words[k, k, w.HOLD] for k in range(3)] == [-inf] * 3
+    assert np.ptp(team.phases) <= 2.0 * schedule.period
+    team.alarms[2] = w.QUIET
+    team.until(all_are(w.ARMED))
+    assert [team.words[k, k, w.HOLD] for k in range(3)] == [inf] * 3
+    team.until(arrived)
+
+
+@pytest.mark.parametrize(("wrong", "holds"), [(1.9, False), (6.0, True)])
+def test_a_stamp_that_clocks_do_not_allow_asks_for_a_hold(wrong, holds):
+    schedule = even_schedule(6)
+    team = Team(schedule, [0.0] * 3)
+    team.until(lambda team: team.time > 1.5)
+    team.clocks[1] = wrong
+    for _ in range(5):
+        team.step()
+    assert (team.words[0, 0, w.HOLD] < inf) == holds
+
+
+def test_people_hold_the_team_at_a_brake_phase_and_let_it_go_on():
+    schedule = even_schedule(6)
+    team = Team(schedule, [0.0] * 3)
+    team.until(lambda team: team.time > 1.5)
+    team.wanted = False
+    team.until(all_are(w.REST))
+    assert team.words[0, 0, w.HOLD] in schedule.brakes
+    assert np.ptp(team.phases) == 0.0
+    for _ in range(50):
+        team.step()
+    assert team.code == (w.HELD, -1)
+    team.wanted = True
+    team.until(arrived)
+
+
+def test_the_supervisor_names_the_robot_that_it_waits_for():
+    schedule = even_schedule(6)
+    team = Team(schedule, [0.0] * 3)
+    team.until(lambda team: team.time > 1.0)
+    team.closed = {(1, k) for k in (0, 2, 3)}
+    team.until(all_are(w.REST))
+    for _ in range(50):
+        team.step()
+    assert team.code == (w.WAITS, 1)
+
+
+# All interleavings of words of three robots; words are up to two steps old, so that W is just enough.
+
+LINKS = [(i, j) for i in range(4) for j in range(4) if i != j]
+SUPERVISORS = [link for link in LINKS if 3 in link]
+BREAKS = (
+    [[link] for link in LINKS]
+    + [[link for link in LINKS if link[1] == k] for k in range(4)]
+    + [[link for link in LINKS if link[0] == k] for k in range(4)]
+    + [[link for link in LINKS if k in link] for k in range(4)]
+)
+
+
+@pytest.mark.parametrize("clocks", [(0, 0, 0, 0), (1, -1, 1, -1), (-1, 1, 1, 1)])
+def test_inside_the_delay_every_interleaving_arrives_without_a_hold(clocks):
+    eps = 0.2 if any(clocks) else 0.0
+    found = explore(schedule_of_steps(clock_error=eps), 2, clocks=clocks)
+    assert found.states > 3000
+    assert found.spread <= 2.0 * eps + ROUNDING
+    assert (found.nowhere, found.beyond) == (0, 0.0)
+
+
+@pytest.mark.parametrize("alarm", [w.ASKS, w.GROWS])
+def test_inside_the_delay_all_brake_at_the_same_phase_whoever_asks_and_whenever(alarm):
+    found = explore(schedule_of_steps(), 2, timely=SUPERVISORS, asks=[(0, alarm)], ask_until=11)
+    assert found.states > 3000
+    assert (found.spread, found.nowhere, found.beyond) == (0.0, 0, 0.0)
+    found = explore(schedule_of_steps(), 1, asks=[(0, alarm)], ask_until=45)
+    assert (found.spread, found.nowhere, found.beyond) == (0.0, 0, 0.0)
+
+
+def test_whatever_breaks_and_is_repaired_no_robot_leaves_the_cells_that_all_allow_and_all_arrive():
+    found = explore(schedule_of_steps(), 1, breaks=BREAKS, until=45)
+    assert found.states > 10000
+    assert (found.nowhere, found.beyond) == (0, 0.0)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "setting",
+    [
+        {"ages": 2, "timely": SUPERVISORS, "asks": [(0, w.ASKS)], "ask_until": 40},
+        {"ages": 2, "timely": SUPERVISORS, "asks": [(0, w.GROWS)], "ask_until": 40},
+        {"ages": 1, "breaks": BREAKS, "until": 40, "asks": [(0, w.GROWS)], "ask_until": 40},
+        {"ages": 2, "timely": SUPERVISORS, "breaks": BREAKS[12::4], "until": 40},
+    ],
+)
+def test_more_interleavings(setting):
+    found = explore(schedule_of_steps(), **setting)
+    print(found)
+    assert found.beyond == 0.0
+    assert "breaks" in setting or (found.spread, found.nowhere) == (0.0, 0)
+
+
+# Random worlds.
+
+
+def world_of(seed):
+    """A schedule, and what monitors and people ask for in it."""
+    generator = np.random.default_rng(seed)
+    schedule = random_schedule(generator, 6, period=generator.choice([0.005, 0.01, 0.02]))
+    begin, pause = generator.uniform(0.0, 4.0, 2)
+    asks = (
+        generator.integers(3),
+        generator.choice([w.ASKS, w.GROWS]),
+        begin,
+        begin + generator.uniform(0.0, 0.3),
+    )
+    return generator, schedule, {"alarms": [asks], "pauses": [(pause, pause + generator.uniform(0.0, 0.5))]}
+
+
+def check_world_inside_the_delay(seed):
+    _, schedule, asks = world_of(seed)
+    for each in ({}, asks):
+        found = run_world(schedule, seed, **each)
+        assert isfinite(found[world.ARRIVAL]), (seed, each)
+        assert found[world.SPREAD] <= 2.0 * EPS + ROUNDING, (seed, each)
+        wrong = found[[world.NOWHERE, world.LIES, world.ROUGH, world.UNEQUAL]]
+        assert not wrong.any(), (seed, each, wrong)
+        assert found[[world.BEYOND, world.OVERRUN]].max() <= 0.0, (seed, each)
+        assert each or (found[world.EPOCHS], found[world.HELD]) == (1.0, 0.0), seed
+
+
+def check_world_beyond_the_delay(seed):
+    generator, schedule, asks = world_of(seed)
+    fault, one = generator.choice([world.DEAF, world.MUTE, world.CUT, world.FORGETS]), generator.integers(4)
+    if fault == world.FORGETS:
+        one = 3
+    begin, span = generator.uniform(0.0, 4.0), generator.uniform(0.05, 1.0)
+    found = run_world(schedule, seed, faults=[(fault, one, begin, begin + span)], **asks)
+    late, ways = span + schedule.period, schedule.ends - schedule.brakes
+    assert isfinite(found[world.ARRIVAL]), seed
+    assert found[world.SPREAD] <= 2.0 * EPS + late + ways[:-1].max(), seed
+    assert found[[world.BEYOND, world.OVERRUN]].max() <= 0.0, seed
+    assert not found[[world.LIES, world.ROUGH]].any(), seed
+
+
+def check_world_with_a_dead_robot(seed):
+    generator, schedule, asks = world_of(seed)
+    one, when = generator.integers(3), generator.uniform(0.0, 3.0)
+    found = run_world(
+        schedule, seed, faults=[(world.DEAD, one, when, inf)], until_rest=True, limit=20.0, **asks
+    )
+    assert isfinite(found[world.ARRIVAL]) or found[world.STILL] > 1.0, seed
+    assert found[[world.BEYOND, world.OVERRUN]].max() <= 0.0, seed
+    assert not found[[world.LIES, world.ROUGH]].any(), seed
+
+
+CHECKS = [check_world_inside_the_delay, check_world_beyond_the_delay, check_world_with_a_dead_robot]
+
+
+@pytest.mark.parametrize("check", CHECKS)
+def test_in_random_worlds_what_is_guaranteed_holds(check):
+    for seed in range(150):
+        check(seed)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("check", CHECKS)
+def test_in_ten_thousand_random_worlds_what_is_guaranteed_holds(check):
+    for seed in range(10000):
+        check(seed)
+
+
+@pytest.mark.parametrize("fault", [world.DEAF, world.MUTE])
+def test_a_robot_that_is_deaf_or_mute_for_half_a_second_parts_nobody(fault):
+    schedule, worst = even_schedule(21), 0.0
+    for seed in range(40):
+        generator = np.random.default_rng(seed)
+        begin = generator.uniform(1.0, 8.0)
+        found = run_world(schedule, seed, faults=[(fault, generator.integers(3), begin, begin + 0.5)])
+        assert isfinite(found[world.ARRIVAL])
+        worst = max(worst, found[world.SPREAD])
+    assert worst <= 2.0 * EPS + ROUNDING
