@@ -269,6 +269,17 @@ def test_nobody_waits_and_all_arrive_in_the_time_of_the_motion_and_one_start():
     assert (rows[:, 0] == rows[:, 1]).all()
 
 
+def test_a_plan_of_one_cell_has_no_brake_phase():
+    schedule = w.schedule_of(
+        [0.0], [0.0], [], [1.5], ramp=0.1, start_rate=2.0, period=0.005, delay=0.05, clock_error=EPS
+    )
+    team = Team(schedule, [0.0] * 2)
+    team.until(lambda team: team.time > 1.0)
+    team.wanted, team.alarms[0] = False, w.ASKS
+    team.until(all_are(w.REST))
+    assert (team.phases == 1.5).all()
+
+
 def test_robots_that_rest_apart_creep_to_the_one_in_front_and_go_on_together():
     schedule = even_schedule(6)
     phases = [0.45, 0.3, 0.7]  # in no common cell: cell 0 ends at 0.548, cell 2 is entered at 0.8

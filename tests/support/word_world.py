@@ -227,9 +227,12 @@ def run_world(schedule, seed, *, robots=3, delay=0.05, loss=0.2, faults=(), alar
         clocks[:, 1] = generator.uniform(0.0, 1e-3 / schedule.clock_error, robots + 1)
     offsets = generator.choice([0.0, 1.0]) * generator.uniform(0.0, 1.0, robots + 1)
     known = w.first_words(schedule, robots), w.first_words(schedule, robots, again=True)
+    events = (
+        np.array(rows, float).reshape(-1, columns)
+        for rows, columns in ((faults, 4), (alarms, 4), (pauses, 2))
+    )
     return run(
-        schedule, *known, clocks, offsets, delay, loss, np.array(faults, float).reshape(-1, 4),
-        np.array(alarms, float).reshape(-1, 4), np.array(pauses, float).reshape(-1, 2), limit, until_rest, seed,
+        schedule, *known, clocks, offsets, delay, loss, *events, limit, until_rest, seed,
     )  # fmt: skip
 
 
@@ -311,7 +314,7 @@ def advance(schedule, clocks, step, words, motions, past, picks, alarms, wanted)
 
 @compiled
 def judge(schedule, clocks, step, words, motions):
-    """Return the difference of phases [s], whether a cell holds all, and how far one is beyond its cells [s]."""
+    """Return the difference of phases [s], whether a cell holds all, how far one is beyond its cells [s]."""
     low, high, least, cells = inf, -inf, inf, schedule.ends.size
     for k in range(words.shape[0] - 1):
         phase = w.phase_at(schedule, motions[k], step + schedule.clock_error * clocks[k])[0]
