@@ -51,12 +51,13 @@ also passes holds on: the smallest one that it has heard in its epoch is its own
    behind creeps to sigma_0, from rest to rest, until t_0 - 2 W. Of an epoch in which others rest already, it
    takes no start.
 3. Who lacks a word that lets it pass the phase b says Hold(b), W before it is there: for b = beta_P if cell P
-   has not been begun by all, for b = sigma_0 if not all have taken the start, for b = S(2 W) if not all have
-   said that they run. The last one ends the run of a robot that does not hear that a start was called off.
+   has not been begun by all, for b = sigma_0 if not all have taken the start.
 4. Its monitor asks for a hold at the next brake phase that it reaches in W or later; a departure that grows,
    at the phase that it reaches in W; above the second threshold, without samples, or when its drives'
    watchdog has run out: at once by all drives, Hold(-infinity), which ends in rest where it is. A stamp that
-   is ahead by more than 2 eps is an alarm of the first kind.
+   is ahead by more than 2 eps is an alarm of the first kind. A robot of which nothing newer than W has been
+   heard is one of the second kind: a hold may have been missed. Inside the delay that cannot be, since words
+   are never older than W - T.
 5. The smallest hold wins. At its phase everybody brakes, or at once where that has passed; never back to run.
    Before t_0 a hold at sigma_0 or less calls the start off.
 6. It rests where the stop or the motion ends, and says so.
@@ -73,9 +74,11 @@ which its predecessor may have used.
   at the same phase to the last bit. No hold is said but those that monitors or people ask for.
 - Whatever is late or lost for ever: sigma_k <= x_P of each robot, and P <= 1 + the least cell begun. So all
   phases lie between tau_c and x_(c+1). Nobody runs unless all have taken the start.
-- Beyond the delay: who learns of a hold by d too late begins to brake by d later, at a phase by at most d
-  larger. Phases of two that move or rest in one epoch differ by at most 2 eps + d + the difference of their
-  ways h, and by at most x_(c+1) - tau_c.
+- Whatever is late or lost, and whoever dies: of an epoch's holds let that at b be reached first, at c. It was
+  said before c - W + T. By c + 2 T everybody has heard it, or else nothing new of the one who said it for W,
+  and brakes by itself before c + W + 2 T. So all that live begin to brake within W + 2 T by their clocks;
+  after a hold of all drives, within 2 W + 2 T. Meanwhile their phases differ by at most that and 2 eps; where
+  they rest, by the difference of their ways h more.
 - Rest is said for ever, so once words arrive again, and nobody is dead, all rest in one epoch, and a start
   follows unless a monitor or a person objects. A start that is called off leaves all at rest in its epoch.
 
@@ -344,10 +347,14 @@ def robot_step(
     """
     own, order, robots = words[robot], words[-1], words.shape[0] - 1
     window, cells, brakes = schedule.window, schedule.ends.size, schedule.brakes
+    quiet = alarm == QUIET
+    own[STAMP] = clock
     for k in range(robots + 1):
         if words[k, STAMP] > clock + 2.0 * schedule.clock_error + ROUNDING:
             alarm = max(alarm, ASKS)
-    own[STAMP], own[FIT] = clock, 1.0 if alarm == QUIET else 0.0
+        if k < robots and words[k, STAMP] < clock - window:
+            alarm = max(alarm, GROWS)
+    own[FIT] = 1.0 if alarm == QUIET else 0.0
     begun = own[CELL]
     for k in range(robots):
         begun = min(begun, words[k, CELL])
@@ -382,10 +389,8 @@ def robot_step(
         ahead = started_phase(schedule, first, w + window)
         limit = max(brakes[may], first) if may < cells - 1 else inf
         for k in range(robots):
-            if words[k, EPOCH] != own[EPOCH] or words[k, KIND] < own[KIND]:
-                limit = (
-                    first if own[KIND] == ARMED else min(limit, started_phase(schedule, first, 2.0 * window))
-                )
+            if own[KIND] == ARMED and words[k, EPOCH] != own[EPOCH]:
+                limit = first
         if w + window >= 0.0 and ahead >= limit:
             hold = min(hold, limit)
         if alarm == ASKS and w + window > 0.0:
@@ -428,7 +433,7 @@ def robot_step(
     if own[KIND] != REST and (stops or ends or hold == -inf):
         own[KIND], own[PHASE], pace, rate = REST, phase, 0.0, 0.0
         motion[ORIGIN], motion[BEGIN] = phase, inf
-    if alarm == QUIET:
+    if quiet:
         while own[CELL] < cells - 1 and schedule.begins[int(own[CELL]) + 1] <= phase:
             own[CELL] += 1.0
     return phase, pace, rate
