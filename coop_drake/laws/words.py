@@ -78,7 +78,8 @@ which its predecessor may have used.
   said before c - W + T. By c + 2 T everybody has heard it, or else nothing new of the one who said it for W,
   and brakes by itself before c + W + 2 T. So all that live begin to brake within W + 2 T by their clocks;
   after a hold of all drives, within 2 W + 2 T. Meanwhile their phases differ by at most that and 2 eps; where
-  they rest, by the difference of their ways h more.
+  they rest, by the difference of their ways h more. In the last cell, who is past its brake phase goes on to
+  the end of the motion.
 - Rest is said for ever, so once words arrive again, and nobody is dead, all rest in one epoch, and a start
   follows unless a monitor or a person objects. A start that is called off leaves all at rest in its epoch.
 
@@ -98,7 +99,7 @@ from coop_drake.tree.pose import FloatArray
 EPOCH, PLAN, STAMP, KIND, CELL, HOLD, PHASE, TIME, FIT = range(9)
 """Columns of words: number of the start that they belong to, number of the plan, when they were said by the
 sender's clock [s], what the sender does, the cell that it has begun, where the team shall brake [s], where
-the sender rests [s], nothing, and whether its monitor is quiet. Of the supervisor CELL has been begun by all,
+the sender rests [s], nothing, and whether it has no alarm. Of the supervisor CELL has been begun by all,
 PHASE is sigma_0 and TIME t_0 [s]."""
 
 WORD_SIZE = 9
@@ -413,7 +414,7 @@ def robot_step(
                     at = better
                     s = tanh(schedule.start_rate * at)
                     better = at - (started_phase(schedule, first, at) - hold) / (s * s)
-            phase = hold
+            phase = max(hold, first)
             if last > at + ROUNDING:  # heard too late
                 at, phase = last, started_phase(schedule, first, last)
             i = np.searchsorted(brakes, phase)

@@ -346,6 +346,15 @@ def test_who_does_not_hear_that_a_start_is_called_off_stops_at_once():
     team.until(arrived)
 
 
+def test_a_hold_behind_the_start_that_comes_just_after_it_stops_where_the_robot_is():
+    team = Team(even_schedule(5), [0.7] * 2)
+    team.until(all_are(w.RUN))
+    team.motions[:, w.LAST], team.words[0, 0, w.HOLD] = 0.0, 0.3
+    rows = team.until(all_are(w.REST))
+    assert (rows[:, :, 0] >= 0.7).all()
+    assert (rows[-1, :, 0] < 0.702).all()
+
+
 @pytest.mark.parametrize("kind", [w.REST, w.ARMED, w.RUN, w.BRAKE])
 @pytest.mark.parametrize("one", [0, 3])
 def test_whatever_a_robot_or_the_supervisor_does_when_it_dies_the_others_come_to_rest_together(kind, one):
