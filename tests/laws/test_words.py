@@ -346,6 +346,20 @@ def test_who_does_not_hear_that_a_start_is_called_off_stops_at_once():
     team.until(arrived)
 
 
+def test_who_never_hears_that_a_cell_is_begun_stops_before_its_end():
+    """Though all words arrive, robot 1 seems not to have begun cell 2."""
+    schedule = even_schedule(6)
+    team, said, braked = Team(schedule, [0.0] * 3), inf, inf
+    while team.kinds[0] != w.REST or team.time < 1.0:
+        team.step()
+        team.past[0, 1, w.CELL] = min(team.past[0, 1, w.CELL], 1.0)
+        said = min(said, team.time) if team.words[0, 0, w.HOLD] < inf else said
+        braked = min(braked, team.time) if team.kinds[0] == w.BRAKE else braked
+    assert team.words[0, 0, w.HOLD] == schedule.brakes[2]
+    assert schedule.ends[1] < team.phases[0] <= schedule.ends[2]
+    assert braked - said == pytest.approx(schedule.window, abs=1.01 * schedule.period)
+
+
 def test_a_hold_behind_the_start_that_comes_just_after_it_stops_where_the_robot_is():
     team = Team(even_schedule(5), [0.7] * 2)
     team.until(all_are(w.RUN))
