@@ -403,6 +403,22 @@ def test_a_supervisor_that_was_started_again_learns_where_all_are_and_skips_an_e
     assert team.words[0, 0, w.EPOCH] == 3.0
 
 
+def test_starts_of_a_supervisor_and_of_its_successor_are_not_taken_for_one():
+    """Robot 0 takes the start of the first one, the others that of the second: neither may count."""
+    team = Team(even_schedule(6), [0.0] * 3)
+    team.closed = {(3, 1), (3, 2)}
+    team.until(lambda team: team.words[-1, -1, w.EPOCH] == 1.0)
+    team.words[-1] = w.first_words(team.schedule, 3, again=True)
+    team.step()
+    assert team.words[-1, -1, w.EPOCH] == 2.0
+    team.closed = set()
+    team.until(lambda team: team.kinds == [w.ARMED] * 3)
+    assert [team.words[k, k, w.EPOCH] for k in range(3)] == [1.0, 2.0, 2.0]
+    rows = team.until(lambda team: team.words[-1, -1, w.EPOCH] > 2.0)
+    assert not rows[:, :, 1].any()
+    team.until(arrived)
+
+
 def test_the_common_brake_stops_all_at_once_and_a_new_start_ends_it():
     schedule = even_schedule(6)
     team = Team(schedule, [0.0] * 3)
