@@ -94,7 +94,7 @@ from typing import NamedTuple
 import numpy as np
 
 from coop_drake.jit import compiled
-from coop_drake.tree.pose import FloatArray
+from coop_drake.tree.arrays import FloatArray
 
 EPOCH, PLAN, STAMP, KIND, CELL, HOLD, PHASE, TIME, FIT = range(9)
 """Columns of words: number of the start that they belong to, number of the plan, when they were said by the
