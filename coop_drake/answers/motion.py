@@ -38,6 +38,8 @@ def _read_rows(rows: tuple[tuple[float, ...], ...]) -> FloatArray:
 
 Windows = Annotated[FloatArray, Codec(tuple[tuple[Number, Number], ...], np.array, np.ndarray.tolist)]
 
+Gains = tuple[Annotated[Positive, EXACT], Annotated[Positive, EXACT]]
+
 ControlPoints = Annotated[FloatArray, Codec(tuple[tuple[Number, ...], ...], _read_rows, np.ndarray.tolist)]
 
 
@@ -61,8 +63,9 @@ class Motion:
         rates: kappa_i, zero for the last cell, which is not left, shape (cells,) [1/s].
         waiting: 2 W [s].
         ramp: r [s].
-        stiffness: K_t, with which object and joints are pulled to the motion [1/s^2].
-        damping: zeta_t, with which their rates are [1/s].
+        start_rate: alpha, with which the pace rises where the team starts again on the way [1/s].
+        gains: K_t [1/s^2] and zeta_t [1/s], with which robots pull the object's position to the motion, then
+            those for its angle and the joints.
     """
 
     points: ControlPoints
@@ -71,8 +74,8 @@ class Motion:
     rates: Vector
     waiting: Annotated[NotNegative, EXACT]
     ramp: Annotated[Positive, EXACT]
-    stiffness: Annotated[Positive, EXACT]
-    damping: Annotated[Positive, EXACT]
+    start_rate: Annotated[Positive, EXACT]
+    gains: tuple[Gains, Gains]
 
     @property
     def duration(self) -> float:

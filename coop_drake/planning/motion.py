@@ -365,7 +365,8 @@ def quickest_motion(plan: Plan, problem: PlanningProblem, age: float) -> Motion:
     period = float(last.points[2, -1] - last.points[1, -1])
     made = last.points[:, :-1].copy(), period, period * last.windows, last.kappa.copy()
     damping = min(LARGEST_DAMPING, AGE_PHASE / age) if age > 0.0 else LARGEST_DAMPING
-    return Motion(*made, WAITING, BRAKE_RAMP, 0.25 * damping * damping, damping)
+    gains = 0.25 * damping * damping, damping
+    return Motion(*made, WAITING, BRAKE_RAMP, last.start_rate, (gains, gains))
 
 
 def uniform_points(points: FloatArray, period: float) -> FloatArray:
@@ -410,8 +411,8 @@ class _Program:
     Besides, it has the parts of a span (``shares``), the first and the last piece of every cell (``first``,
     ``last``), u at which the motion enters and leaves every cell (``windows``, shape (cells, 2)), kappa and
     where it acts (``kappa``, ``acting``, see ``brake``), which unknowns are held (``held``), how they change
-    with the length of a span (``lengths``), least times between control points (``shortest``), and the
-    ``course`` of ``barrier``.
+    with the length of a span (``lengths``), least times between control points (``shortest``), the
+    ``course`` of ``barrier``, and after ``slow_down`` the rate of starts on the way (``start_rate``).
     """
 
     cells: CellSets
@@ -547,8 +548,11 @@ class _Program:
         brake(self.points, self.windows, self.waiting, self.kappa, self.acting)
         begin = np.append(-inf, windows[:-1, 0] + self.waiting)[:-1]
         ranges = np.stack([begin, windows[:-1, 1]], axis=1)
-        fast, hard, rough = largest_shares(points, period, self.chains, self.limits, self.kappa, ranges)
+        shares = largest_shares(points, period, self.chains, self.limits, self.kappa, ranges)
+        fast, hard, rough, starting = shares
         factor = max(fast, hard**0.5, rough ** (1.0 / 3.0), 1.0)
         self.points[:, -1] *= factor
         brake(self.points, self.windows, self.waiting, self.kappa, self.acting)
+        # With rho' up to alpha (1 - rho^2), a start keeps the limits of acceleration where alpha V does.
+        self.start_rate = float(factor) / starting
         return float(factor)

@@ -248,10 +248,11 @@ CHECKS = 8
 def largest_shares(
     points: FloatArray, period: float, chains: Chains, limits: FloatArray, kappa: FloatArray,
     ranges: FloatArray,
-) -> tuple[float, float, float]:  # fmt: skip
-    """Return the largest shares of the limits of speed, acceleration and jerk, braking included [-].
+) -> tuple[float, float, float, float]:  # fmt: skip
+    """Return the largest shares of limits of speed, acceleration and jerk [-], and speed over acceleration.
 
-    They are those at ``CHECKS`` places of every span; of jerk, the differences of accelerations at knots.
+    Accelerations include those in stops; the last number is the largest speed over the limit of acceleration
+    [s]. They are those at ``CHECKS`` places of every span; of jerk, the differences of accelerations at knots.
 
     Args:
         points: Control points of a spline of the time with equal spans, shape (m, 3 + n).
@@ -262,7 +263,7 @@ def largest_shares(
         ranges: When a stop with it may begin, and when it has ended, shape (cells, 2) [s].
     """
     m, d = points.shape
-    fastest, hardest, roughest = 0.0, 0.0, 0.0
+    fastest, hardest, roughest, longest = 0.0, 0.0, 0.0, 0.0
     nominal = np.empty((3, d))
     moved, by, before = np.empty((2, 2)), np.empty((4, 2, d)), np.zeros((len(limits), 2))
     for span in range(m - 3):
@@ -273,7 +274,10 @@ def largest_shares(
             for point in range(len(limits)):
                 size = follow(chains, point, x, v, a, moved, by)
                 speed = np.sqrt((moved[0, :size] ** 2).sum())
-                fastest = max(fastest, speed / limits[point, 0])
+                fastest, longest = (
+                    max(fastest, speed / limits[point, 0]),
+                    max(longest, speed / limits[point, 1]),
+                )
                 hardest = max(hardest, np.sqrt((moved[1, :size] ** 2).sum()) / limits[point, 1])
                 for cell in range(len(ranges)):
                     if ranges[cell, 0] <= time <= ranges[cell, 1]:
@@ -284,4 +288,4 @@ def largest_shares(
                     if check == CHECKS:
                         roughest = max(roughest, change / period / limits[point, 2])
                     before[point, :size] = moved[1, :size]
-    return fastest, hardest, roughest
+    return fastest, hardest, roughest, longest

@@ -65,7 +65,7 @@ class MotionGovernor(_Follower):
             self._object.Eval(context),
             output.get_mutable_value(),
         )
-        gains = self._motion.stiffness, self._motion.damping
+        gains = self._motion.gains[0]
         command[:2] = nominal[1, :2]
         for axis in range(2):
             command[2 + axis] = pulled(nominal, axis, state[axis], state[3 + axis], *gains)
@@ -77,7 +77,7 @@ class MotionGovernor(_Follower):
         nominal, departing = self._nominal(context), self._object.Eval(context).copy()
         departing[3:5] -= nominal[1, :2]
         edges = self._edges[index_of(self._current.Eval(context), len(self._edges))]
-        output[0] = kernels.cell_margin(edges, self._motion.stiffness, departing, nominal[0, :2])[0]
+        output[0] = kernels.cell_margin(edges, self._motion.gains[0][0], departing, nominal[0, :2])[0]
 
 
 class MotionAxes(_Follower):
@@ -117,7 +117,7 @@ class MotionAxes(_Follower):
             self._object.Eval(context),
             output.get_mutable_value(),
         )
-        gains = self._motion.stiffness, self._motion.damping
+        gains = self._motion.gains[1]
         wanted[0] = pulled(nominal, self._axes[0], state[2], state[5], *gains)
         if len(self._axes) > 1:
             robot, half = self._robot.Eval(context), 2 + len(self._axes)

@@ -117,12 +117,11 @@ def _check_pull(motion: Motion, gain_set: GainSet) -> None:
     age = gain_set.age if isinstance(gain_set, ScheduledGains) else 0.0
     largest = defaults.LARGEST_DAMPING
     damping = largest if age == 0.0 else min(largest, defaults.AGE_PHASE / age)
-    for name, found, expected in (
-        ("damping", motion.damping, damping),
-        ("stiffness", motion.stiffness, 0.25 * damping**2),
-    ):
-        if not abs(found - expected) <= RELATIVE * expected:
-            raise RefusalError(f"motion.{name}", f"is {found}; commands {age:g} s old give {expected}")
+    for i, found in enumerate(motion.gains):
+        for k, expected in enumerate((0.25 * damping**2, damping)):
+            if not abs(found[k] - expected) <= RELATIVE * expected:
+                finding = f"is {found[k]}; commands {age:g} s old give {expected}"
+                raise RefusalError(f"motion.gains[{i}][{k}]", finding)
 
 
 def _axis(plan: Plan, axis: int) -> str:
@@ -386,8 +385,10 @@ def _movers(problem: PlanningProblem) -> Iterator[_Mover]:
 
 
 def _check_limits(motion: Motion, windows: FloatArray, problem: PlanningProblem) -> list[Check]:
-    """Check speeds and accelerations, while braking, too, and mean jerks.
+    """Check speeds and accelerations, in stops and starts, too, and mean jerks.
 
+    In a start from any phase, rho' is at most alpha (1 - rho^2), so that rho^2 A + rho' V lies between A and
+    alpha V.
     The team may brake for cell i from tau_(i-1) + 2 W on; before, it does so for the cell before.
     """
     begins = [0.0, *((motion.windows[:-1, 0] + motion.waiting) / motion.period).tolist()]
@@ -395,7 +396,7 @@ def _check_limits(motion: Motion, windows: FloatArray, problem: PlanningProblem)
     every = _Parts(*(np.concatenate([getattr(way, name) for way in ways]) for name in _Parts._fields))
     movers = list(_movers(problem))
     found = [_prove_limits(motion, mover, every) for mover in movers]
-    name = "limits of speed and acceleration are kept at all times, while braking, too"
+    name = "limits of speed and acceleration are kept at all times, in stops and starts, too"
     kept = Check(
         name,
         sum(count for count, _ in found),
@@ -425,16 +426,19 @@ def _shares(motion: Motion, mover: _Mover, parts: _Parts) -> tuple[FloatArray, F
     """Return shares of limits that are used, and bounds for all of each part.
 
     Returns:
-        Shares of the limits of speed and of acceleration, without braking and with it, at both ends of parts,
-        shape (3, P, 2) [-]; bounds on all three between them, shape (P,) [-].
+        Shares of the limits of speed and of acceleration, at full pace, in a stop and in a start, at both
+        ends of parts, shape (4, P, 2) [-]; bounds on all of them between the ends, shape (P,) [-].
     """
     z, v, a, j = _derivatives(motion, parts)
     found = [mover.rates(z[:, end], v[:, end], a[:, end]) for end in (0, 1)]
     V, A = (np.stack(each, axis=1) for each in zip(*found, strict=True))  # (P, 2, 1 or 2)
     kappa = motion.rates[parts.cells][:, None]
     speeds, most = np.linalg.norm(V, axis=2), mover.acceleration
+    starts = most / motion.start_rate
     braking = np.maximum(np.linalg.norm(A - kappa[..., None] * V, axis=2), kappa * speeds)
-    shares = np.stack([speeds / mover.speed, np.linalg.norm(A, axis=2) / most, braking / most])
+    shares = np.stack(
+        [speeds / mover.speed, np.linalg.norm(A, axis=2) / most, braking / most, speeds / starts]
+    )
     # A function whose second derivative is at most M departs from its chord by M step^2 / 8 at most, and the
     # chord is nowhere longer than at an end. z'' is linear, and z' and z are half a step from one at most.
     step = motion.period * np.diff(parts.ends, axis=1)
@@ -442,7 +446,7 @@ def _shares(motion: Motion, mover: _Mover, parts: _Parts) -> tuple[FloatArray, F
     most_v = np.abs(v).max(axis=1) + 0.5 * step * most_a
     most_z = np.abs(z).max(axis=1) + 0.5 * step * most_v
     of_v, of_a = mover.curving(most_z, most_v, most_a, np.abs(j))
-    between = np.stack([of_v / mover.speed, of_a / most, (of_a + kappa[:, 0] * of_v) / most])
+    between = np.stack([of_v / mover.speed, of_a / most, (of_a + kappa[:, 0] * of_v) / most, of_v / starts])
     bound: FloatArray = (shares.max(axis=2) + between * step[:, 0] ** 2 / 8.0).max(axis=0)
     return shares, bound
 
@@ -476,7 +480,9 @@ def _refuse_limit(motion: Motion, mover: _Mover, parts: _Parts) -> NoReturn:
     what += "" if shares[kind, end] > 1.0 + RELATIVE else " perhaps more than"
     value = f"{shares[kind, end] * limit:.9g} {mover.unit}/{unit}"
     braking = f" while the team brakes at {motion.rates[cell]:.6g} /s" if kind == 2 else ""
+    braking = f" while the team starts at {motion.start_rate:.6g} /s" if kind == 3 else braking
     where = f"motion.rates[{cell}]" if kind == 2 else f"motion.points[{1 + round(place)}]"
+    where = "motion.start_rate" if kind == 3 else where
     finding = f"at {motion.period * place:.6g} s {mover.name} {what} {value}{braking}"
     raise RefusalError(where, f"{finding}; the limit is {limit:g} {mover.unit}/{unit}")
 

@@ -140,6 +140,12 @@ def other_rate(motion, row, rate):
     return {"rates": rates}
 
 
+def other_gain(motion, loop, gain, factor):
+    gains = [list(each) for each in motion.gains]
+    gains[loop][gain] *= factor
+    return tuple(map(tuple, gains))
+
+
 def stretched(motion, factor, *, stops):
     """All times changed, and rates so that stops still end where they must."""
     windows = factor * motion.windows
@@ -194,8 +200,9 @@ ALTERED = {
         lambda m: stretched(m, 0.99, stops=True), r"motion\.(points|rates)\[\d+\]: at .*limit"
     ),
     "a jump": (lambda m: moved_points(m, 100, 0, 0.3), r"motion\.(points|windows)\[\d+\]: from"),
-    "pulled harder": (lambda m: {"stiffness": 1.01 * m.stiffness}, r"motion\.stiffness"),
-    "pulled with less damping": (lambda m: {"damping": 0.99 * m.damping}, r"motion\.damping"),
+    "starts more quickly": (lambda m: {"start_rate": 1.02 * m.start_rate}, r"motion\.start_rate"),
+    "pulled harder": (lambda m: {"gains": other_gain(m, 0, 0, 1.01)}, r"motion\.gains\[0\]\[0\]"),
+    "pulled with less damping": (lambda m: {"gains": other_gain(m, 1, 1, 0.99)}, r"motion\.gains\[1\]\[1\]"),
     "no number in points": (lambda m: moved_points(m, 100, 0, np.nan), r"motion\."),
     "no number in windows": (lambda m: moved_window(m, 5, 1, np.nan), r"motion\.windows\[5\]"),
     "no number in rates": (lambda m: other_rate(m, 5, np.nan), r"motion\.rates\[5\]"),
@@ -302,7 +309,7 @@ def test_every_limit_counts_as_the_problem_states_it(base, name):
     while high - low > 1e-3 * high:
         middle = 0.5 * (low + high)
         if where := refusal(plan, with_limit(problem, name, middle)):
-            assert where.startswith(("motion.points[", "motion.rates["))
+            assert where.startswith(("motion.points[", "motion.rates[", "motion.start_rate"))
             low = middle
         else:
             high = middle

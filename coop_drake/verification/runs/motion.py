@@ -77,7 +77,8 @@ def _check_law(
 ) -> Check:
     """Check that position, angle and joints are accelerated along the motion, and pulled to it."""
     off, fast = rows.z - nominal, rows.rates - velocity
-    expected = acceleration - motion.stiffness * off - motion.damping * fast
+    gains = np.array(motion.gains)[np.minimum(np.arange(off.shape[1]) // 2, 1)]  # x, y, then theta and q
+    expected = acceleration - gains[:, 0] * off - gains[:, 1] * fast
     difference = np.abs(rows.log.accelerations - expected)
     text = "the motion asks for {:.9g}, and the acceleration is {:.9g}"
     rows.require(difference <= DRIVEN, "accelerations", text, expected, rows.log.accelerations)
@@ -93,8 +94,8 @@ def _check_margin(rows: Rows, motion: Motion, nominal: FloatArray, velocity: Flo
         margins[members] = signed_distances(cell.tidied, nominal[members, :2])
     fast = np.rint((rows.rates - velocity)[:, :2] / STEP) * STEP
     energy = 0.5 * (fast**2).sum(axis=1)
-    energy += 0.5 * motion.stiffness * ((rows.z - nominal)[:, :2] ** 2).sum(axis=1)
-    margins = 0.5 * motion.stiffness * margins * np.abs(margins) - energy
+    energy += 0.5 * motion.gains[0][0] * ((rows.z - nominal)[:, :2] ** 2).sum(axis=1)
+    margins = 0.5 * motion.gains[0][0] * margins * np.abs(margins) - energy
     rows.require_same("energy_margin", margins, SAME + STEP)
     rows.require(log.energy_margin >= 0.0, "energy_margin", "is {:.3g}, negative", log.energy_margin)
     name, least = "Delta E of the departure is right and never negative", float(margins.min())
