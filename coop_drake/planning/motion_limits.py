@@ -252,7 +252,7 @@ def largest_shares(
     """Return the largest shares of limits of speed, acceleration and jerk [-], and speed over acceleration.
 
     Accelerations include those in stops; the last number is the largest speed over the limit of acceleration
-    [s]. They are those at ``CHECKS`` places of every span; of jerk, the differences of accelerations at knots.
+    [s]. All are those at ``CHECKS`` places of every span; jerk is the difference of accelerations at knots.
 
     Args:
         points: Control points of a spline of the time with equal spans, shape (m, 3 + n).
