@@ -351,7 +351,8 @@ def turning(base):
     period, wide = 0.8, np.full(plan.start.size - 2, 20.0)
     end = replace(plan.transitions[-1], goal_lower=-wide, goal_upper=wide)
     windows = np.array([[0.0, period * (len(points) - 3)]])
-    motion = replace(plan.motion, points=points, period=period, windows=windows, rates=np.zeros(1))
+    still = {"windows": windows, "rates": np.zeros(1), "start_rate": 0.1}
+    motion = replace(plan.motion, points=points, period=period, **still)
     cells = (replace(plan.cells[0], lower=-wide, upper=wide, tidied=shapely.box(-99.0, -99.0, 99.0, 99.0)),)
     made = replace(plan, cells=cells, transitions=(end,), goal_pose=points[-1, :3], motion=motion)
     (origin, *bases), _ = places(problem, points[:1])
