@@ -22,7 +22,8 @@ S(w) = sigma_0 + w - tanh(alpha w) / alpha,  S' = tanh^2(alpha w),  S'' = 2 alph
 Because 2 sqrt(rho) <= 1 + rho, rho' <= alpha (1 - rho^2). Accelerations are rho^2 A + rho' V with A = X'' and
 V = X', forces likewise. If a convex set of what is allowed contains 0, A and alpha V, it therefore contains
 them during the whole start, wherever it begins. The start costs 1 / alpha and never quite ends; after
-20 / alpha the pace is 1 to the last bit.
+20 / alpha the pace is 1 to the last bit. At phase 0 V and A are zero, so that S(w) = w, with pace 1 at once:
+such a start costs nothing.
 
 **Braking** goes on in w, whose rate p falls from 1 to 0 in the time 2 h, symmetrically: p' falls to -k within
 the ramp r and rises to 0 within r, k = 1 / (2 h - r); a stop shorter than 2 r has ramps of h. Half of its
@@ -32,7 +33,9 @@ beta_i or before, with any pace, ends by x_i. With rho = S' p and rho' = S'' p^2
 
 -kappa_i <= rho' <= alpha (1 - rho^2),
 
-also where a stop begins during the start. Pace and acceleration are continuous. It is enough that the plan
+also where a stop begins during the start. Pace and acceleration are continuous. A stop stands in the robot's
+motion as soon as the robot knows that it begins within W, so that times ahead of a sample have their phase,
+too. It is enough that the plan
 states for the phases from beta_(i-1) to x_i that A, -kappa_i V and A - kappa_i V are allowed, and for all
 phases that alpha V and -alpha V are. In the last cell no stop begins after the last brake phase: the motion
 itself ends.
@@ -60,12 +63,17 @@ also passes holds on: the smallest one that it has heard in its epoch is its own
    are never older than W - T.
 5. The smallest hold wins. At its phase everybody brakes, or at once where that has passed; never back to run.
    Before t_0 a hold at sigma_0 or less calls the start off.
-6. It rests where the stop or the motion ends, and says so.
+6. It rests where the stop or the motion ends, and says so. One that measures there that it is at the goal
+says that it is fit by 2 instead of 1.
+
+At a sample at k T a robot hears what others said at samples before k T (at (k - 1) T, where words are not
+late), decides by what its monitor said at the sample before, measures, commands, and says its row.
 
 **Rules of the supervisor,** the only author of starts: when all rest in the same epoch, are fit, and sigma_0,
 the largest of their phases, is at most x_(c+1), c being the least cell begun, it says the start of the next
 epoch at t_0 = now + C + 3 W, C being the longest time to creep. It holds it at sigma_0 where somebody has not
-taken it W before t_0, as every robot does by itself. One that was started again during a run skips an epoch,
+taken it W before t_0, as every robot does by itself. The team has arrived when all rest at the motion's end
+and measure that they are at the goal. A supervisor that was started again during a run skips an epoch,
 which its predecessor may have used.
 
 **What is guaranteed.**
@@ -99,7 +107,7 @@ from coop_drake.tree.arrays import FloatArray
 EPOCH, PLAN, STAMP, KIND, CELL, HOLD, PHASE, TIME, FIT = range(9)
 """Columns of words: number of the start that they belong to, number of the plan, when they were said by the
 sender's clock [s], what the sender does, the cell that it has begun, where the team shall brake [s], where
-the sender rests [s], nothing, and whether it has no alarm. Of the supervisor CELL has been begun by all,
+the sender rests [s], nothing, and 0 for an alarm, 1 for none, 2 for none at the goal. Of the supervisor CELL has been begun by all,
 PHASE is sigma_0 and TIME t_0 [s]."""
 
 WORD_SIZE = 9
@@ -108,12 +116,13 @@ WORD_SIZE = 9
 START, ARMED, RUN, BRAKE, REST = range(5)
 """Kinds of words: the supervisor's, and what a robot does, in the order in which it does them in an epoch."""
 
-QUIET, ASKS, GROWS, BRAKES = range(4)
-"""What a robot's monitor says: nothing, that the team be held, soon, or by all drives at once."""
+THERE, QUIET, ASKS, GROWS, BRAKES = range(-1, 4)
+"""What a robot's monitor says: that the robot is at the goal, nothing, that the team be held, soon, or by all
+drives at once."""
 
 GOES, WAITS, DEPARTS, HELD, ARRIVED = range(5)
-"""What the supervisor sees: the team is under way or about to start; it waits for a robot's words; a robot's
-monitor keeps it from starting; a person does; it has arrived."""
+"""What the supervisor sees: the team is under way or about to start; it waits for a robot's words, or until it
+is at the goal; a robot's monitor keeps it from starting; a person does; it has arrived."""
 
 ORIGIN, FIRST, BEGIN, CREEP, BRAKE_AT, WAY, END, LAST = range(8)
 """Columns of a robot's motion: where it rests or rested [s], sigma_0 [s], t_0, infinite at rest [s], how long
@@ -247,10 +256,24 @@ def first_motion(phase: float = 0.0) -> FloatArray:
 
 
 @compiled
-def started_phase(schedule: Schedule, first: float, w: float) -> float:
-    """Return S(w), sigma_0 being ``first``; sigma_0 before the start [s]."""
+def started(schedule: Schedule, first: float, w: float) -> tuple[float, float, float]:
+    """Return S(w) [s], S' [-] and S'' [1/s], sigma_0 being ``first``; those of rest there before the start."""
+    if not w > 0.0:
+        return first, 0.0, 0.0
+    if not first > 0.0:
+        return first + w, 1.0, 0.0
     alpha = schedule.start_rate
-    return first + w - tanh(alpha * w) / alpha if w > 0.0 else first
+    s = tanh(alpha * w)
+    return first + w - s / alpha, s * s, 2.0 * alpha * s * (1.0 - s * s)
+
+
+@compiled(borrows=True)
+def next_brake(schedule: Schedule, phase: float) -> int:
+    """Return the first cell whose brake phase is not before a phase, M for none."""
+    i = 0
+    while i < schedule.brakes.size and schedule.brakes[i] < phase:
+        i += 1
+    return i
 
 
 @compiled
@@ -270,7 +293,7 @@ def phase_at(schedule: Schedule, motion: FloatArray, clock: float) -> tuple[floa
     Args:
         schedule: The schedule.
         motion: The robot's motion, shape (MOTION_SIZE,).
-        clock: What its clock shows, from the last sample on [s].
+        clock: What its clock shows, from the last sample on until W later [s].
     """
     first, w = motion[FIRST], clock - motion[BEGIN]
     if not w > 0.0:
@@ -283,7 +306,7 @@ def phase_at(schedule: Schedule, motion: FloatArray, clock: float) -> tuple[floa
         v = u * (1.0 - u)
         phase = motion[ORIGIN] + way * u * u * u * (10.0 + u * (6.0 * u - 15.0))
         return phase, 30.0 * way / time * v * v, 60.0 * way / (time * time) * v * (1.0 - 2.0 * u)
-    alpha, p, rate, end, u = schedule.start_rate, 1.0, 0.0, schedule.ends[-1], w - motion[BRAKE_AT]
+    p, rate, end, u = 1.0, 0.0, schedule.ends[-1], w - motion[BRAKE_AT]
     if u > 0.0:
         h = motion[WAY]
         r, end = min(schedule.ramp, h), motion[END]
@@ -297,11 +320,10 @@ def phase_at(schedule: Schedule, motion: FloatArray, clock: float) -> tuple[floa
         else:
             p, rate = 0.5 * kappa / r * left * left, -kappa / r * left
             w = motion[BRAKE_AT] + h - kappa / (6.0 * r) * left * left * left
-    phase, s = started_phase(schedule, first, w), tanh(alpha * w)
+    phase, pace, bend = started(schedule, first, w)
     if phase >= schedule.ends[-1]:
         return schedule.ends[-1], 0.0, 0.0
-    pace = s * s
-    return min(phase, end), pace * p, 2.0 * alpha * s * (1.0 - pace) * p * p + pace * rate
+    return min(phase, end), pace * p, bend * p * p + pace * rate
 
 
 @compiled(borrows=True)
@@ -348,14 +370,14 @@ def robot_step(
     """
     own, order, robots = words[robot], words[-1], words.shape[0] - 1
     window, cells, brakes = schedule.window, schedule.ends.size, schedule.brakes
-    quiet = alarm == QUIET
+    quiet = alarm <= QUIET
     own[STAMP] = clock
     for k in range(robots + 1):
         if words[k, STAMP] > clock + 2.0 * schedule.clock_error + ROUNDING:
             alarm = max(alarm, ASKS)
         if k < robots and words[k, STAMP] < clock - window:
             alarm = max(alarm, GROWS)
-    own[FIT] = 1.0 if alarm == QUIET else 0.0
+    own[FIT] = 2.0 if alarm == THERE else 1.0 if alarm == QUIET else 0.0
     begun = own[CELL]
     for k in range(robots):
         begun = min(begun, words[k, CELL])
@@ -368,7 +390,7 @@ def robot_step(
             creep = creep_time(schedule, first - phase)
             own[EPOCH] = order[EPOCH]
             if (
-                alarm == QUIET and clock <= order[TIME] - 2.0 * window - creep
+                alarm <= QUIET and clock <= order[TIME] - 2.0 * window - creep
                 and phase <= first <= schedule.ends[min(may, cells - 1)] and order[HOLD] > first
             ):  # fmt: skip
                 own[KIND], own[HOLD] = ARMED, inf
@@ -385,9 +407,9 @@ def robot_step(
         if words[k, EPOCH] == own[EPOCH]:
             hold = min(hold, words[k, HOLD])
     first, w = motion[FIRST], clock - motion[BEGIN]
-    if own[KIND] in (ARMED, RUN):
+    ahead, running = started(schedule, first, w + window)[0], own[KIND] in (ARMED, RUN)
+    if running:
         # Words that lack, and what the monitor asks for.
-        ahead = started_phase(schedule, first, w + window)
         limit = max(brakes[may], first) if may < cells - 1 else inf
         for k in range(robots):
             if own[KIND] == ARMED and words[k, EPOCH] != own[EPOCH]:
@@ -395,7 +417,7 @@ def robot_step(
         if w + window >= 0.0 and ahead >= limit:
             hold = min(hold, limit)
         if alarm == ASKS and w + window > 0.0:
-            i = np.searchsorted(brakes, ahead)
+            i = next_brake(schedule, ahead)
             hold = min(hold, brakes[i] if i < cells else inf)
         elif alarm in (ASKS, GROWS):
             hold = min(hold, ahead)
@@ -405,27 +427,29 @@ def robot_step(
         own[KIND] = RUN if hold > first else REST
         if own[KIND] == REST:  # called off
             own[PHASE], motion[ORIGIN], motion[BEGIN] = first, first, inf
-    if own[KIND] == RUN:
-        if started_phase(schedule, first, w) >= hold:
-            at, better, last = 0.0, hold - first + 1.0 / schedule.start_rate, motion[LAST]
-            if hold > first:  # Newton's method from above, as S is convex
-                at = inf
-                while better < at:
-                    at = better
-                    s = tanh(schedule.start_rate * at)
-                    better = at - (started_phase(schedule, first, at) - hold) / (s * s)
-            phase = max(hold, first)
-            if last > at + ROUNDING:  # heard too late
-                at, phase = last, started_phase(schedule, first, last)
-            i = np.searchsorted(brakes, phase)
-            if i < cells:
-                own[KIND], way = BRAKE, schedule.ends[i] - brakes[i]
-                ramp = min(schedule.ramp, way)
-                time = 2.0 * way - ramp  # 1 / kappa
-                for _ in range(SHORTENING):
-                    s = tanh(schedule.start_rate * (at + way))
-                    way = min(way, 0.5 * (s * s * time + ramp))
-                motion[BRAKE_AT], motion[WAY], motion[END] = at, way, schedule.ends[i]
+    running = own[KIND] == RUN or (own[KIND] == ARMED and hold > first)
+    if running and ahead >= hold:
+        at, better, last = 0.0, hold - first + 1.0 / schedule.start_rate, motion[LAST]
+        if hold > first:  # Newton's method from above, as S is convex
+            at = inf
+            while better < at:
+                at = better
+                phase, pace, _ = started(schedule, first, at)
+                better = at - (phase - hold) / pace
+        phase = max(hold, first)
+        if last > at + ROUNDING:  # heard too late
+            at, phase = last, started(schedule, first, last)[0]
+        i = next_brake(schedule, phase)
+        if i < cells:
+            way = schedule.ends[i] - brakes[i]
+            ramp = min(schedule.ramp, way)
+            time = 2.0 * way - ramp  # 1 / kappa
+            for _ in range(SHORTENING):
+                way = min(way, 0.5 * (started(schedule, first, at + way)[1] * time + ramp))
+            motion[BRAKE_AT], motion[WAY], motion[END] = at, way, schedule.ends[i]
+            if started(schedule, first, w)[0] >= hold:
+                own[KIND] = BRAKE
+    if own[KIND] in (RUN, BRAKE) and running:
         motion[LAST] = w
 
     phase, pace, rate = phase_at(schedule, motion, clock)
@@ -455,7 +479,7 @@ def supervisor_step(schedule: Schedule, clock: float, wanted: bool, words: Float
     """
     own, robots, window, cells = words[-1], words.shape[0] - 1, schedule.window, schedule.ends.size
     own[STAMP] = clock
-    lowest, unfit, behind, resting, epoch = 0, -1, -1, 0, words[0, EPOCH]
+    lowest, unfit, away, behind, resting, epoch = 0, -1, -1, -1, 0, words[0, EPOCH]
     first, last = words[0, PHASE], words[0, PHASE]
     for k in range(robots):
         if words[k, EPOCH] == own[EPOCH]:
@@ -468,21 +492,23 @@ def supervisor_step(schedule: Schedule, clock: float, wanted: bool, words: Float
             behind = k
         if not words[k, FIT] > 0.0 and unfit < 0:
             unfit = k
+        if words[k, FIT] < 2.0 and away < 0:
+            away = k
         if words[k, CELL] < words[lowest, CELL]:
             lowest = k
         first, last = min(first, words[k, PHASE]), max(last, words[k, PHASE])
     if resting < robots:
         if not wanted and own[EPOCH] != UNKNOWN:
             w = clock - own[TIME] + window
-            ahead = started_phase(schedule, own[PHASE], w)
-            i = np.searchsorted(schedule.brakes, ahead)
+            ahead = started(schedule, own[PHASE], w)[0]
+            i = next_brake(schedule, ahead)
             named = schedule.brakes[i] if i < cells else inf
             own[HOLD] = min(own[HOLD], named if w > 0.0 else ahead)
         return (WAITS, behind) if resting > 0 else (GOES, -1)
     if unfit >= 0:
         return DEPARTS, unfit
     if first >= schedule.ends[-1]:
-        return ARRIVED, -1
+        return (WAITS, away) if away >= 0 else (ARRIVED, -1)
     if not wanted:
         return HELD, -1
     cell = words[lowest, CELL]

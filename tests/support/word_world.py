@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from itertools import product
-from math import inf
+from math import cos, floor, inf
 from typing import NamedTuple
 
 import numpy as np
@@ -71,7 +71,14 @@ def sample(schedule, motion, times):
     return found
 
 
-@compiled
+@compiled(borrows=True)
+def put(target, source):
+    """Copy a row: numba takes long to compile assignments to slices."""
+    for i in range(target.size):
+        target[i] = source[i]
+
+
+@compiled(borrows=True)
 def suffers(faults, fault, node, t):
     """Whether somebody has a fault at a time."""
     for i in range(len(faults)):
@@ -82,7 +89,7 @@ def suffers(faults, fault, node, t):
 
 @compiled
 def run(
-    schedule, first_words, again_words, clocks, offsets, delay, loss, faults, alarms, pauses, limit,
+    schedule, first_words, again_words, clocks, offsets, order, delay, loss, faults, alarms, pauses, limit,
     until_rest, seed,
 ):  # fmt: skip
     """Run a team and return what ``ARRIVAL`` and the others name.
@@ -93,6 +100,7 @@ def run(
         again_words: What a supervisor knows that was started again.
         clocks: Of everybody: a clock is wrong by eps cos(a + b t), rows (a, b).
         offsets: When everybody samples in a period, as a share of it.
+        order: Everybody in the order of these.
         delay: Largest delay [s]. A word of which no repeat is in time arrives after just this time.
         loss: Share of words that are lost [-].
         faults: Rows (fault, row of the one, begin, end).
@@ -108,15 +116,16 @@ def run(
     slots = int(delay / period) + 4
     words = np.empty((nodes, nodes, w.WORD_SIZE))
     motions, episodes = np.zeros((robots, w.MOTION_SIZE)), np.zeros((robots, w.MOTION_SIZE))
+    boxes, due = np.zeros((nodes, slots, w.WORD_SIZE)), np.zeros((nodes, nodes, slots))
+    taken = np.ones((nodes, nodes, slots))
     for node in range(nodes):
-        words[node] = first_words
+        for k in range(nodes):
+            put(words[node, k], first_words[k])
     for k in range(robots):
         motions[k, w.BEGIN] = motions[k, w.BRAKE_AT] = inf
         motions[k, w.ORIGIN] = motions[k, w.FIRST] = first_words[k, w.PHASE]
-        episodes[k] = motions[k]
-    boxes = np.zeros((nodes, slots, w.WORD_SIZE))
-    due, taken = np.full((nodes, nodes, slots), inf), np.ones((nodes, nodes, slots), np.bool_)
-    order, found = np.argsort(offsets), np.zeros(11)
+        put(episodes[k], motions[k])
+    found = np.zeros(11)
     found[ARRIVAL] = inf
     now, before = np.zeros((robots, 3)), np.zeros((robots, 3))
     forgot, code, still = False, 0, 0.0
@@ -128,36 +137,37 @@ def run(
     for m in range(int(limit / period)):
         for node in order:
             t = (m + offsets[node]) * period
-            clock = t + schedule.clock_error * np.cos(clocks[node, 0] + clocks[node, 1] * t)
+            clock = t + schedule.clock_error * cos(clocks[node, 0] + clocks[node, 1] * t)
             if suffers(faults, DEAD, node, t):
                 continue
             if suffers(faults, FORGETS, node, t) and not forgot:
-                forgot, words[node] = True, again_words
+                forgot = True
+                for k in range(nodes):
+                    put(words[node, k], again_words[k])
             cut = suffers(faults, CUT, node, t)
             deaf, mute = cut or suffers(faults, DEAF, node, t), cut or suffers(faults, MUTE, node, t)
             for sender in range(nodes):
-                oldest = int(np.floor((t - delay) / period - offsets[sender] + 1e-6)) % slots
+                oldest = int(floor((t - delay) / period - offsets[sender] + 1e-6)) % slots
                 passes = not deaf and not suffers(faults, CUT, sender, t)
                 for slot in range(slots):
-                    if not taken[sender, node, slot] and (due[sender, node, slot] <= t or slot == oldest):
-                        taken[sender, node, slot] = True
+                    if taken[sender, node, slot] == 0.0 and (due[sender, node, slot] <= t or slot == oldest):
+                        taken[sender, node, slot] = 1.0
                         if passes:
                             w.hear(words[node], sender, boxes[sender, slot])
             if node < robots:
-                alarm = w.QUIET
+                alarm = w.THERE
                 for i in range(len(alarms)):
                     if int(alarms[i, 0]) == node and alarms[i, 2] <= t < alarms[i, 3]:
                         alarm = max(alarm, int(alarms[i, 1]))
                 begin, origin = motions[node, w.BEGIN], motions[node, w.ORIGIN]
-                before[node] = now[node]
+                put(before[node], now[node])
                 now[node, 0], now[node, 1], now[node, 2] = w.robot_step(
                     schedule, clock, alarm, node, motions[node], words[node]
                 )
                 own = words[node, node]
-                if motions[node, w.BEGIN] < inf:
-                    episodes[node] = motions[node]
-                elif begin < inf:
-                    episodes[node] = motions[node]
+                if motions[node, w.BEGIN] < inf or begin < inf:
+                    put(episodes[node], motions[node])
+                if not motions[node, w.BEGIN] < inf and begin < inf:
                     episodes[node, w.BEGIN], episodes[node, w.ORIGIN] = begin, origin
                 found[EPOCHS] = max(found[EPOCHS], own[w.EPOCH])
                 # Pace and phase from sample to sample, and the bounds of the rate.
@@ -165,11 +175,17 @@ def run(
                 rough = now[node, 0] < before[node, 0] - 1e-12 or now[node, 0] > before[node, 0] + step
                 rough = rough or not -hardest - 1e-9 <= now[node, 2]
                 rough = rough or not now[node, 2] <= schedule.start_rate * (1.0 - now[node, 1] ** 2) + 1e-9
-                rough = rough or abs(now[node, 1] - before[node, 1]) > hardest * 1.001 * step
+                jumps = motions[node, w.FIRST] == 0.0 and before[node, 1] == 0.0  # a start at phase 0
+                rough = rough or (
+                    not jumps and abs(now[node, 1] - before[node, 1]) > hardest * 1.001 * step
+                )
                 if rough and own[w.HOLD] > -inf and m > 0:
                     # At the end the motion itself is at rest, whatever the pace.
                     found[ROUGH] += 1.0 if now[node, 0] < schedule.ends[-1] else 0.0
-                may = 1 + int(max(words[node, :robots, w.CELL].min(), words[node, robots, w.CELL]))
+                begun = own[w.CELL]
+                for k in range(robots):
+                    begun = min(begun, words[node, k, w.CELL])
+                may = 1 + int(max(begun, words[node, robots, w.CELL]))
                 found[OVERRUN] = max(found[OVERRUN], now[node, 0] - schedule.ends[min(may, cells - 1)])
                 found[LIES] += 1.0 if now[node, 0] < schedule.begins[int(own[w.CELL])] else 0.0
             else:
@@ -180,9 +196,9 @@ def run(
                 if code == w.ARRIVED and found[ARRIVAL] == inf:
                     found[ARRIVAL] = t
             slot = m % slots
-            boxes[node, slot] = words[node, node]
+            put(boxes[node, slot], words[node, node])
             for receiver in range(nodes):
-                taken[node, receiver, slot] = mute or receiver == node
+                taken[node, receiver, slot] = 1.0 if mute or receiver == node else 0.0
                 lost, age = np.random.random() < loss, delay * np.random.random()  # noqa: NPY002
                 due[node, receiver, slot] = inf if lost else t + age
         # What holds at the instant m T, for which everybody has decided.
@@ -192,7 +208,7 @@ def run(
             least = min(least, words[k, k, w.CELL])
             if suffers(faults, DEAD, k, t):
                 continue
-            clock = t + schedule.clock_error * np.cos(clocks[k, 0] + clocks[k, 1] * t)
+            clock = t + schedule.clock_error * cos(clocks[k, 0] + clocks[k, 1] * t)
             phase, rest = w.phase_at(schedule, episodes[k], clock)[0], words[k, k, w.PHASE]
             if words[k, k, w.KIND] == w.REST:
                 phase = min(phase, rest)
@@ -232,7 +248,7 @@ def run_world(schedule, seed, *, robots=3, delay=0.05, loss=0.2, faults=(), alar
         for rows, columns in ((faults, 4), (alarms, 4), (pauses, 2))
     )
     return run(
-        schedule, *known, clocks, offsets, delay, loss, *events, limit, until_rest, seed,
+        schedule, *known, clocks, offsets, np.argsort(offsets), delay, loss, *events, limit, until_rest, seed,
     )  # fmt: skip
 
 
@@ -277,7 +293,8 @@ def choices(words, past, passes):
             if sender == receiver or not passes[sender, receiver]:
                 continue
             for age in range(ages):
-                table[age] = words[receiver]
+                for node in range(nodes):
+                    put(table[age, node], words[receiver, node])
                 w.hear(table[age], sender, past[age, sender])
                 new = True
                 for other in range(age):
@@ -306,9 +323,10 @@ def advance(schedule, clocks, step, words, motions, past, picks, alarms, wanted)
         else:
             code = w.supervisor_step(schedule, clock, wanted, words[node])[0]
     for age in range(past.shape[0] - 1, 0, -1):
-        past[age] = past[age - 1]
+        for node in range(nodes):
+            put(past[age, node], past[age - 1, node])
     for node in range(nodes):
-        past[0, node] = words[node, node]
+        put(past[0, node], words[node, node])
     return code
 
 
@@ -354,7 +372,7 @@ def explore(
         asks: Robots and alarms: one of these monitors may give its alarm once, for one step.
         ask_until: The last step at which it may.
     """
-    nodes, clocks = 4, np.array(clocks)
+    nodes, clocks = 4, np.array(clocks, float)
     words = np.array([w.first_words(schedule, 3)] * nodes)
     start = Moment(words, np.array([w.first_motion()] * 3), np.array([words[0]] * ages), -1, False)
     layer, states, steps, spread, nowhere, beyond = {b"": start}, 1, 0, 0.0, 0, -inf
@@ -366,9 +384,9 @@ def explore(
                 broken += range(len(breaks))
             elif moment.broken >= 0:
                 broken = [-2] if step >= until else [moment.broken, -2]
-            alarms = [(w.QUIET,) * 3]
+            alarms = [(w.THERE,) * 3]
             if asks and not moment.asked and step < ask_until:
-                alarms += [tuple(a if k == one else w.QUIET for k in range(3)) for one, a in asks]
+                alarms += [tuple(a if k == one else w.THERE for k in range(3)) for one, a in asks]
             for now_broken in broken:
                 passes = ~np.eye(nodes, dtype=bool)
                 for link in breaks[now_broken] if now_broken >= 0 else ():
@@ -390,7 +408,7 @@ def explore(
                         spread, beyond = max(spread, parted), max(beyond, over)
                         nowhere, steps = nowhere + (not common), steps + 1
                         if code != w.ARRIVED:
-                            then = Moment(*arrays, now_broken, moment.asked or any(alarm))
+                            then = Moment(*arrays, now_broken, moment.asked or max(alarm) > w.QUIET)
                             found.setdefault(then.key(), then)
         states, layer = states + len(found), found
         if not layer:
@@ -427,7 +445,7 @@ class Team:
             self.words[-1] = w.first_words(schedule, self.robots, again=True)
         self.past = self.words[0][None].copy()
         self.closed, self.gone, self.clocks = set(), set(), np.zeros(nodes)
-        self.alarms, self.wanted, self.code, self.number = [w.QUIET] * self.robots, True, (w.GOES, -1), 0
+        self.alarms, self.wanted, self.code, self.number = [w.THERE] * self.robots, True, (w.GOES, -1), 0
 
     @property
     def time(self):
