@@ -28,9 +28,9 @@ _LARGEST = 4000.0
 """Largest log [MB]; a minute of transport has about ten."""
 
 
-def _row(unit: str, *shape: str | int) -> dict[str, Any]:
-    """Describe a column by its unit and the shape of a row."""
-    return {"unit": unit, "shape": ("T", *shape), "kind": "fi"}
+def _row(unit: str, *shape: str | int, optional: bool = False) -> dict[str, Any]:
+    """Describe a column by its unit, the shape of a row, and whether logs may lack it."""
+    return {"unit": unit, "shape": ("T", *shape), "kind": "fi", "optional": optional}
 
 
 def _text(*shape: str) -> dict[str, Any]:
@@ -121,6 +121,10 @@ class SimulationLog:
     """``plan_digest`` of the plan that was followed."""
     scenario_digest: str = field(default="", metadata=_text())
     """``scenario_digest`` of the scenario that was simulated."""
+    phases: FloatArray = field(
+        default_factory=lambda: np.empty((0, 0, 3)), metadata=_row("s, -, 1/s", "N", 3, optional=True)
+    )
+    """Phase on the plan's motion by every robot's clock, pace and its rate; only where the plan has one."""
 
     @property
     def peak_force_rate(self) -> float:
@@ -140,6 +144,9 @@ class SimulationLog:
             path: Where to write; an existing file is replaced.
         """
         arrays: dict[str, Any] = {f.name: np.asarray(getattr(self, f.name)) for f in fields(self)}
+        for name in _optional():
+            if not arrays[name].size:
+                del arrays[name]
         write_atomically(path, lambda stream: np.savez_compressed(stream, **arrays))
 
     @classmethod
@@ -159,6 +166,7 @@ class SimulationLog:
                 check_readable(path, _LARGEST).open("rb") as stream,
                 np.load(stream, allow_pickle=False) as archive,
             ):
+                names = [name for name in names if name in archive or name not in _optional()]
                 if missing := [name for name in names if name not in archive]:
                     raise PlanError(
                         f"{path}: not a simulation log; it lacks {', '.join(missing)}; expected what a run "
@@ -169,10 +177,16 @@ class SimulationLog:
             raise PlanError(f"{path}: cannot be read: {error}; expected the .npz file of a run") from error
         _check(path, values)
         for one in fields(cls):
+            if one.name not in values:
+                continue
             kind, shape = one.metadata["kind"], one.metadata["shape"]
             if kind == "U":
                 values[one.name] = tuple(map(str, values[one.name])) if shape else str(values[one.name])
         return cls(**{**values, "reached": bool(values["reached"])})
+
+
+def _optional() -> list[str]:
+    return [one.name for one in fields(SimulationLog) if one.metadata.get("optional")]
 
 
 def _array(path: Path, archive: Any, name: str) -> np.ndarray[Any, Any]:
@@ -189,6 +203,8 @@ def _check(path: Path, arrays: dict[str, np.ndarray[Any, Any]]) -> None:
     """Refuse arrays that do not have the shapes and kinds of the table."""
     sizes: dict[str, int] = {}
     for one in fields(SimulationLog):
+        if one.name not in arrays:
+            continue
         array, shape, kind = arrays[one.name], one.metadata["shape"], one.metadata["kind"]
         # To numpy an empty list of names is one of numbers.
         if array.size and array.dtype.kind not in kind:

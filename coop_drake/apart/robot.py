@@ -22,7 +22,7 @@ from coop_drake.diagram.robot_controller import RobotKnowledge, build_robot_cont
 from coop_drake.laws import actuators
 from coop_drake.laws.axis_table import GOAL_LOWER, GOAL_UPPER, SLICE_LOWER, SLICE_UPPER, track_row
 from coop_drake.laws.measurements import period_of, whole_periods
-from coop_drake.laws.nominal import place_on_axes
+from coop_drake.laws.motion import place_on_axes
 from coop_drake.laws.readiness import BRAKES
 from coop_drake.laws.robot_dynamics import PX, PY, motion_room, write_motion
 from coop_drake.plant import robot_chain

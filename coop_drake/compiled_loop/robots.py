@@ -22,7 +22,8 @@ from coop_drake.compiled_loop.arrays import (
 from coop_drake.jit import compiled
 from coop_drake.laws.axis_table import track_axes, write_jumps
 from coop_drake.laws.measurements import NOTHING, carry_measurements, uniform_pair, write_errors
-from coop_drake.laws.nominal import carry_axes, place_on_axes, pull_axes, track_nominal
+from coop_drake.laws.motion import place_on_axes
+from coop_drake.laws.nominal import carry_axes, pull_axes, track_nominal
 from coop_drake.laws.readiness import (
     FAR,
     QUIET,

@@ -7,12 +7,8 @@ from coop_drake.diagram.closed_loop import (
     build_closed_loop,
     build_station,
 )
-from coop_drake.diagram.robot_controller import (
-    TELEMETRY,
-    Replacements,
-    RobotKnowledge,
-    build_robot_controller,
-)
+from coop_drake.diagram.deployment import TELEMETRY
+from coop_drake.diagram.robot_controller import Replacements, RobotKnowledge, build_robot_controller
 from coop_drake.diagram.world import World, brakes_of, build_world, control_period
 
 __all__ = [

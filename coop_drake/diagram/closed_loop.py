@@ -18,14 +18,21 @@ from pydrake.systems.primitives import (
     ConstantValueSource,
     ConstantVectorSource,
     Demultiplexer,
+    Multiplexer,
     Selector,
     TrajectorySource,
 )
 from pydrake.trajectories import PiecewisePolynomial
 
 from coop_drake.answers.plan import Plan
-from coop_drake.diagram.deployment import DeployedController, deploy
-from coop_drake.diagram.robot_controller import Replacements, build_robot_controller, hold_of, robot_knowledge
+from coop_drake.diagram.deployment import DeployedController, deploy, radio_of
+from coop_drake.diagram.robot_controller import (
+    Replacements,
+    build_robot_controller,
+    hold_of,
+    robot_knowledge,
+    team_schedule,
+)
 from coop_drake.harmonic_maps import HarmonicMap
 from coop_drake.plant import SeparateTeam, TeamPlant, build_separate_team, build_team_plant, set_configuration
 from coop_drake.plant.team import displacement
@@ -34,9 +41,11 @@ from coop_drake.systems import (
     CellPlanner,
     HoldSupervisor,
     TeamSensor,
+    WordPlanner,
     build_selector,
     build_separate_sensor,
     robot_record,
+    supervisor_record,
 )
 from coop_drake.systems.block import release_all
 from coop_drake.systems.departures import add_departures, tilt_floor
@@ -248,7 +257,7 @@ class ClosedLoop(Loop):
         supervisor: What holds the team, None where nothing can ask for it.
     """
 
-    cell_planner: CellPlanner
+    cell_planner: CellPlanner | WordPlanner
     controllers: tuple[Diagram, ...]
     deployed: tuple[DeployedController, ...]
     supervisor: HoldSupervisor | None
@@ -267,10 +276,14 @@ class ClosedLoop(Loop):
 
     def outputs(self, ports: PortRow) -> Outputs:
         """Add the outputs of robots and supervisor to a row, and return where they stand."""
-        names = robot_record(0, holds=True, monitored=True)
-        supervisor = {name: ports.add(self.cell_planner, name) for name in ("current_cell", "arrived")}
-        if self.supervisor is not None:
-            supervisor["causes"] = ports.add(self.supervisor, "causes")
+        names = robot_record(0, holds=True, monitored=True, passes=True)
+        sources = [self.cell_planner, *([] if self.supervisor is None else [self.supervisor])]
+        supervisor = {
+            name: ports.add(source, name)
+            for name in supervisor_record(0, holds=True)
+            for source in sources
+            if source.HasOutputPort(name)
+        }
         return Outputs(
             [
                 {name: ports.add(law, name) for name in names if law.HasOutputPort(name)}
@@ -288,7 +301,7 @@ def build_closed_loop(
     *,
     replacements: Replacements | None = None,
 ) -> ClosedLoop:
-    """Build the closed loop; only ready reports, and requests for a hold if any, cross between robots.
+    """Build the closed loop; only ready reports, and requests for a hold if any, or words cross between robots.
 
     Args:
         scenario: The scenario.
@@ -307,18 +320,17 @@ def build_closed_loop(
     knowledge = robot_knowledge(scenario, plan, maps, team)
     start = plan.start + displacement(scenario.deployment, len(plan.start))
     builder.AddNamedSystem("transport_station", station.diagram)
-    planner = builder.AddNamedSystem(
-        "cell_planner",
-        CellPlanner(
-            len(team.robots),
-            len(plan.cells),
-            period=scenario.deployment.period,
-            entries=[] if plan.motion is None else plan.motion.windows[1:, 0].tolist(),
-        ),
-    )
+    passes, period = team_schedule(scenario, plan), scenario.deployment.period
+    planner: CellPlanner | WordPlanner
+    if passes is None:
+        planner = CellPlanner(len(team.robots), len(plan.cells), period=period)
+    else:
+        names = [robot.name for robot in team.robots]
+        planner = WordPlanner(passes, radio_of(scenario.deployment, names, len(names)))
+    builder.AddNamedSystem("cell_planner", planner)
     hold, supervisor = hold_of(scenario, plan), None
     if hold is not None:
-        supervisor = add_supervisor(builder, hold, planner, len(team.robots), scenario.deployment.period)
+        supervisor = add_supervisor(builder, hold, planner, len(team.robots), period)
     built, deployed = [], []
     for k, known in enumerate(knowledge):
         controller = build_robot_controller(known, replacements)
@@ -334,23 +346,43 @@ def build_closed_loop(
                 controller.GetOutputPort("hold_request"), supervisor.GetInputPort(f"robot_{k}_request")
             )
         built.append(controller)
+    if passes is not None:
+        _add_network(builder, [*built, planner], scenario.control.hold)
     return ClosedLoop(
         builder.Build(), station, plan, start, planner, tuple(built), tuple(deployed), supervisor
     )
 
 
 def _connect(
-    builder: DiagramBuilder, station: Diagram, planner: CellPlanner, controller: Diagram, k: int
+    builder: DiagramBuilder,
+    station: Diagram,
+    planner: CellPlanner | WordPlanner,
+    controller: Diagram,
+    k: int,
 ) -> None:
     builder.Connect(station.GetOutputPort("object_pose"), controller.GetInputPort("object_pose"))
     builder.Connect(station.GetOutputPort(f"robot_{k}_state"), controller.GetInputPort("robot_state"))
-    builder.Connect(planner.GetOutputPort("current_cell"), controller.GetInputPort("current_cell"))
-    builder.Connect(controller.GetOutputPort("ready"), planner.GetInputPort(f"robot_{k}_ready"))
+    if isinstance(planner, CellPlanner):
+        builder.Connect(planner.GetOutputPort("current_cell"), controller.GetInputPort("current_cell"))
+        builder.Connect(controller.GetOutputPort("ready"), planner.GetInputPort(f"robot_{k}_ready"))
     builder.Connect(controller.GetOutputPort("robot_effort"), station.GetInputPort(f"robot_{k}_effort"))
 
 
+def _add_network(builder: DiagramBuilder, speakers: Sequence[System], hold: Hold | None) -> None:
+    """Let robots and the supervisor, the last one, hear what everybody sends."""
+    network = builder.AddNamedSystem(
+        "network", Multiplexer([one.GetOutputPort("said").size() for one in speakers])
+    )
+    for i, one in enumerate(speakers):
+        builder.Connect(one.GetOutputPort("said"), network.get_input_port(i))
+        builder.Connect(network.get_output_port(), one.GetInputPort("words"))
+    if hold is not None:
+        order = builder.AddNamedSystem("hold_order", _order(hold))
+        builder.Connect(order.get_output_port(0), speakers[-1].GetInputPort("order"))
+
+
 def add_supervisor(
-    builder: DiagramBuilder, hold: Hold, planner: CellPlanner, robots: int, period: float | None
+    builder: DiagramBuilder, hold: Hold, planner: System, robots: int, period: float | None
 ) -> HoldSupervisor:
     """Add the supervisor with the scheduled order, and keep the team in its cell while it is held.
 

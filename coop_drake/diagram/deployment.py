@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from math import inf
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -12,7 +13,6 @@ from pydrake.systems.framework import Context, Diagram, DiagramBuilder, InputPor
 from pydrake.trajectories import PiecewisePolynomial
 
 from coop_drake import systems
-from coop_drake.diagram.robot_controller import TELEMETRY
 from coop_drake.laws.measurements import NOTHING, uniform_pair, whole_periods
 from coop_drake.scenario import Deafness, Deployment, Messages, PoseBias, RobotDepartures, Silence
 from coop_drake.tree.arrays import FloatArray
@@ -41,6 +41,53 @@ def seed_of(deployment: Deployment, robot: int, use: int = 0) -> int:
     """
     words = [deployment.seed, robot, use] if use else [deployment.seed, robot]
     return int(np.random.SeedSequence(words).generate_state(1)[0])
+
+
+TELEMETRY = (
+    "object_state",
+    "governor_position",
+    "energy_margin",
+    "funnels",
+    "object_acceleration",
+    "hand_command",
+)
+"""Outputs of blocks that are exported for the log and for users."""
+
+WORD_USE = 8
+"""First use of the seeds of the words that a robot, or the supervisor, hears of everybody."""
+
+
+def radio_of(deployment: Deployment, names: Sequence[str], row: int) -> systems.Radio:
+    """Return how a robot hears and speaks the words of a team that passes, or the supervisor, the last row.
+
+    Args:
+        deployment: What is switched on.
+        names: Names of all robots.
+        row: Number of the robot.
+    """
+    period, messages, robots = deployment.period, deployment.messages, len(names)
+    if period is None:
+        return systems.Radio(row, robots)
+    own = [*map(deployment.of_robot, names), RobotDepartures()]
+    late = [whole_periods(messages.delay + one.switch_delay, period) for one in own]
+    return systems.Radio(
+        row,
+        robots,
+        kept=1 + max(late),
+        late=late[row],
+        loss=messages.loss,
+        seeds=[seed_of(deployment, row, WORD_USE + sender) for sender in range(1 + robots)],
+        clock_error=own[row].clock_error,
+        offset=own[row].sample_offset,
+        deaf=_interval(own[row].deaf),
+        mute=_interval(own[row].silence),
+    )
+
+
+def _interval(fault: Silence | Deafness | None) -> tuple[float, float]:
+    if fault is None:
+        return inf, inf
+    return fault.begin, inf if fault.duration is None else fault.begin + fault.duration
 
 
 # The blocks that a deployment puts between one robot's controller and the rest of the loop.

@@ -12,12 +12,14 @@ from pydrake.systems.primitives import Demultiplexer, DiscreteTimeIntegrator, In
 
 from coop_drake import systems
 from coop_drake.answers.plan import Plan
+from coop_drake.diagram.deployment import TELEMETRY, radio_of
 from coop_drake.errors import PlanError, ScenarioError
 from coop_drake.geometry.polygons import BoundaryDistance
 from coop_drake.harmonic_maps import HarmonicMap, VelocityField
 from coop_drake.laws.governor import FIELD_SPEED, slowdown_radius
 from coop_drake.laws.measurements import observer_gains, whole_periods
 from coop_drake.laws.readiness import ArrivalGoal, unseen_time
+from coop_drake.laws.words import CLOCK_ERROR, WORD_PERIOD, Schedule, schedule_of
 from coop_drake.plant import ObjectInertia, RobotPlant, TeamPlant, base_chain, build_robot_plant, robot_chain
 from coop_drake.plant.team import RobotModel
 from coop_drake.scenario import Hold, Scenario
@@ -25,18 +27,11 @@ from coop_drake.systems import AxisMotion, GovernedCell, MonitoredRobot, Nominal
 from coop_drake.tree.arrays import FloatArray
 from coop_drake.tree.component_tree import PlanarPose
 
-TELEMETRY = (
-    "object_state",
-    "governor_position",
-    "energy_margin",
-    "funnels",
-    "object_acceleration",
-    "hand_command",
-)
-"""Outputs of blocks that are exported for the log and for users."""
-
 HELD = ("hold_request", "clock")
 """Outputs of a robot whose team may be held."""
+
+PASSES = ("said", "phase", "current_cell")
+"""Outputs of a robot whose team passes from cell to cell."""
 
 
 @dataclass(frozen=True)
@@ -63,6 +58,10 @@ class RobotKnowledge:
             measured.
         monitored: What its monitor of departures needs; None where there is no nominal motion.
         measured_age: Age of its measurements, in whole periods [s].
+        schedule: Of the words of a team that passes from cell to cell; None for one that rests in them.
+        radio: How it hears and speaks these.
+        mounting: See ``place_on_axes``, shape (1 + n,).
+        lag: Time constant of the actuators that it counts on [s].
     """
 
     robot: RobotPlant
@@ -83,6 +82,17 @@ class RobotKnowledge:
     axis_motion: systems.AxisMotion | None = None
     monitored: systems.MonitoredRobot | None = None
     measured_age: float = 0.0
+    schedule: Schedule | None = None
+    radio: systems.Radio | None = None
+    mounting: FloatArray | None = None
+    lag: float = 0.0
+
+    @property
+    def measurement_periods(self) -> int:
+        """How many periods older than now what it uses is [-]."""
+        if self.period is None or self.predicted_periods:
+            return 0
+        return whole_periods(self.measured_age, self.period)
 
     @property
     def p_LE(self) -> FloatArray:
@@ -117,18 +127,18 @@ def robot_knowledge(
 
     Raises:
         PlanError: The plan belongs to another team, or the number of maps is not the number of cells.
-        ScenarioError: The plan's motion is for an ideal team.
+        ScenarioError: The plan's motion is for an ideal team, or words may be later than it allows.
     """
     _check(plan, maps, team)
-    if plan.motion is not None and not (scenario.ideal and scenario.control.hold is None):
+    if plan.motion is not None and not scenario.ideal:
         raise ScenarioError(
-            str(scenario.path), "planner.hand_over", "pass",
-            "rest: the plan's motion is for an ideal team that is not held",
-        )  # fmt: skip
+            str(scenario.path), "planner.hand_over", "pass", "rest: the plan's motion is for an ideal team"
+        )
     cells = governed_cells(plan, maps)
     factor, deployment, control = 1.0 + scenario.deployment.mass_error, scenario.deployment, scenario.control
     hold = hold_of(scenario, plan)
     delay = whole_periods(deployment.measurements.delay, deployment.period) if deployment.period else 0
+    schedule, names = team_schedule(scenario, plan), [robot.name for robot in team.robots]
     return [
         RobotKnowledge(
             robot=_robot(scenario, robot.index, factor),
@@ -149,9 +159,41 @@ def robot_knowledge(
             measured_age=deployment.whole_delay,
             axis_motion=_axis_motion(scenario, plan, team, robot, 0 if control.predictor else delay),
             monitored=_monitored(scenario, plan, team, robot, delay),
+            schedule=schedule,
+            radio=None if schedule is None else radio_of(deployment, names, robot.index),
+            mounting=base_chain(team, robot).mounting,
+            lag=deployment.actuators.lag if plan.budget is None else plan.budget.lag,
         )
         for robot in team.robots
     ]
+
+
+def team_schedule(scenario: Scenario, plan: Plan) -> Schedule | None:
+    """Return the schedule of the words of a team that passes from cell to cell, None for one that rests.
+
+    Raises:
+        ScenarioError: Words may be later than the plan's motion allows.
+    """
+    motion, deployment = plan.motion, scenario.deployment
+    if motion is None:
+        return None
+    period = deployment.period or WORD_PERIOD
+    delay = 0.5 * motion.waiting - 2.0 * CLOCK_ERROR - 2.0 * period
+    if delay < 0.0:
+        allowed = f"at least {4.0 / (motion.waiting - 4.0 * CLOCK_ERROR):.6g} Hz, for words of the plan's motion"
+        raise ScenarioError(
+            str(scenario.path), "deployment.control_rate", deployment.control_rate, allowed
+        )
+    if deployment.messages.delay > delay:
+        allowed = f"at most {delay:.6g} s: the plan's motion waits no longer for words"
+        raise ScenarioError(
+            str(scenario.path), "deployment.messages.delay", deployment.messages.delay, allowed
+        )
+    begins, ends = motion.windows[:, 0], motion.windows[:, 1]
+    return schedule_of(
+        begins, begins, begins[:-1] + motion.waiting, ends, ramp=motion.ramp, start_rate=motion.start_rate,
+        period=period, delay=delay, clock_error=CLOCK_ERROR,
+    )  # fmt: skip
 
 
 def governed_cells(plan: Plan, maps: Sequence[HarmonicMap]) -> list[GovernedCell]:
@@ -175,7 +217,12 @@ def rest_tolerance(scenario: Scenario, plan: Plan) -> float:
 
 
 def hold_of(scenario: Scenario, plan: Plan) -> Hold | None:
-    """Return when the team is held, None for never; where a plan has a budget, monitors may ask for it."""
+    """Return when the team is held by its funnels' clock, None for never.
+
+    Where a plan has a budget, monitors may ask for it. A team that passes from cell to cell is held by words.
+    """
+    if plan.motion is not None:
+        return None
     return scenario.control.hold or (None if plan.alarms is None else Hold())
 
 
@@ -337,6 +384,9 @@ def build_robot_controller(knowledge: RobotKnowledge, replacements: Replacements
     input   ``current_cell``      2           (index, entry time), from the cell planner
     output  ``robot_effort``      3 + n       its base wrench and joint torques
     output  ``ready``             2           (index, margin), for the cell planner
+    input   ``words``             (N + 1) m 9 in place of ``current_cell`` where the team passes from cell to
+                                              cell: what everybody sent, see ``RobotWords``
+    output  ``said``              9 m         what it sends, likewise; then ``ready`` is for the log alone
     input   ``hold_message``      2           from the hold supervisor, only where the team may be held
     output  ``hold_request``      2           to the hold supervisor, only where the team may be held
     output  ``alarm``             3           of its monitor of departures, for itself and the log, only where
@@ -362,7 +412,7 @@ def build_robot_controller(knowledge: RobotKnowledge, replacements: Replacements
         for block in blocks.values()
         for port in (block.get_output_port(i) for i in range(block.num_output_ports()))
     }
-    if knowledge.motion is None and knowledge.plan.motion is None:
+    if knowledge.motion is None and knowledge.schedule is None:
         halves = builder.AddNamedSystem("governor_rate", Demultiplexer([2, 2]))
         builder.Connect(outputs["governor_command"], halves.get_input_port())
         start, rate = knowledge.plan.start[:2], halves.get_output_port(0)
@@ -374,7 +424,8 @@ def build_robot_controller(knowledge: RobotKnowledge, replacements: Replacements
     _connect_by_name(builder, blocks, outputs)
     held = HELD if knowledge.hold is not None else ()
     alarm = () if knowledge.monitored is None else ("alarm",)
-    for name in ("robot_effort", "ready", *TELEMETRY, *held, *alarm):
+    passes = () if knowledge.schedule is None else PASSES
+    for name in ("robot_effort", "ready", *TELEMETRY, *held, *alarm, *passes):
         builder.ExportOutput(outputs[name], name)
     return builder.Build()
 
@@ -393,10 +444,23 @@ def _blocks(knowledge: RobotKnowledge) -> dict[str, LeafSystem]:
     )
     measured = knowledge.period is not None
     led: dict[str, LeafSystem]
-    if plan.motion is not None:
+    if plan.motion is not None and knowledge.schedule is not None and knowledge.radio is not None:
+        period = knowledge.period
         led = {
-            "motion_governor": systems.MotionGovernor(plan.motion, cells),
-            "motion_axes": systems.MotionAxes(plan.motion, laws, [2 + axis for axis in axes]),
+            "robot_words": systems.RobotWords(
+                knowledge.schedule,
+                knowledge.radio,
+                alarmed=knowledge.monitored is not None,
+                ahead=None if period is None else 0.5 * period + knowledge.lag,
+                age=knowledge.measurement_periods,
+            ),
+            "motion_follower": systems.MotionFollower(
+                plan.motion,
+                cells,
+                laws,
+                [2 + axis for axis in axes[1:]],
+                knowledge.mounting if measured else None,
+            ),
             "ready_monitor": systems.PassingMonitor(plan.motion, *judged, measured=measured),
         }
     else:
@@ -528,12 +592,13 @@ def _connect_by_name(
         renamed: dict[str, str] = {}
         if "state_predictor" in blocks and label not in _RAW:
             renamed |= _REPLACED["state_predictor"]
+        if "object_ahead" in outputs and label in _COMPENSATED:
+            renamed |= _AHEAD
         if "nominal_axes" in blocks and label != "nominal_axes":
             if label in _FOLLOWERS:
                 renamed |= _NOMINAL
             else:
                 renamed["axis_acceleration"] = "pulled_axes"
-                renamed |= _AHEAD if label in _COMPENSATED else {}
         if "disturbance_observer" in blocks and label in _COMPENSATED:
             renamed |= _REPLACED["disturbance_observer"]
         for port in (block.get_input_port(i) for i in range(block.num_input_ports())):

@@ -144,25 +144,3 @@ def pull_axes(
         rate = robot_state[5 + n + i] if i else object_state[5]
         away, fast = x - expected[0, i], rate - expected[1, i]
         pulled[i] = commands[i] + governed_acceleration(away, fast, 0.0, gains[0], gains[1])
-
-
-@compiled(borrows=True)
-def place_on_axes(axes: FloatArray, mounting: FloatArray, robot_state: FloatArray) -> None:
-    """Write the angles of a robot whose object and joints stand and move as given: yaw, joints, and rates.
-
-    Its base turns with the object and against its joints: yaw = theta + offset + sum of turn_i q_i. The
-    base's position and velocity are left as they are.
-
-    Args:
-        axes: (theta, q_k) and their rates, shape (2, 1 + n) or more rows.
-        mounting: Yaw of the base in the object where all joints are at zero [rad], then what a unit of every
-            joint turns the base by in the object [-], shape (1 + n,).
-        robot_state: (z_k, z_k'), shape (2 (3 + n),).
-    """
-    n, half = axes.shape[1] - 1, 2 + axes.shape[1]
-    for row in range(2):
-        yaw = axes[row, 0] + (mounting[0] if row == 0 else 0.0)
-        for i in range(1, 1 + n):
-            yaw += mounting[i] * axes[row, i]
-            robot_state[row * half + 2 + i] = axes[row, i]
-        robot_state[row * half + 2] = yaw

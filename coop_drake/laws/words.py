@@ -71,10 +71,9 @@ late), decides by what its monitor said at the sample before, measures, commands
 
 **Rules of the supervisor,** the only author of starts: when all rest in the same epoch, are fit, and sigma_0,
 the largest of their phases, is at most x_(c+1), c being the least cell begun, it says the start of the next
-epoch at t_0 = now + C + 3 W, C being the longest time to creep. It holds it at sigma_0 where somebody has not
-taken it W before t_0, as every robot does by itself. The team has arrived when all rest at the motion's end
-and measure that they are at the goal. A supervisor that was started again during a run skips an epoch,
-which its predecessor may have used.
+epoch at t_0 = now + C + 3 W, C being the longest time to creep. The team has arrived when all rest at the
+motion's end and measure that they are at the goal. A supervisor that was started again during a run skips an
+epoch, which its predecessor may have used.
 
 **What is guaranteed.**
 - Inside delay and eps: |sigma_j - sigma_k| <= 2 eps at every moment, since all run S of the same numbers,
@@ -121,8 +120,9 @@ THERE, QUIET, ASKS, GROWS, BRAKES = range(-1, 4)
 drives at once."""
 
 GOES, WAITS, DEPARTS, HELD, ARRIVED = range(5)
-"""What the supervisor sees: the team is under way or about to start; it waits for a robot's words, or until it
-is at the goal; a robot's monitor keeps it from starting; a person does; it has arrived."""
+"""What the supervisor sees: the team is under way or about to start, or a robot is not yet at the goal where
+the motion has ended; it waits for a robot's words; a robot's monitor keeps it from starting; a person does;
+it has arrived."""
 
 ORIGIN, FIRST, BEGIN, CREEP, BRAKE_AT, WAY, END, LAST = range(8)
 """Columns of a robot's motion: where it rests or rested [s], sigma_0 [s], t_0, infinite at rest [s], how long
@@ -131,6 +131,9 @@ sample in which it ran [s]."""
 
 MOTION_SIZE = 8
 """Number of columns of a robot's motion."""
+
+WORD_PERIOD, CLOCK_ERROR = 0.005, 0.002
+"""T of a team that is not sampled, and eps of all teams [s]."""
 
 UNKNOWN = -1.0
 """Epoch of a supervisor that was started again during a run."""
@@ -484,8 +487,6 @@ def supervisor_step(schedule: Schedule, clock: float, wanted: bool, words: Float
     for k in range(robots):
         if words[k, EPOCH] == own[EPOCH]:
             own[HOLD] = min(own[HOLD], words[k, HOLD])
-        if words[k, EPOCH] != own[EPOCH] and clock >= own[TIME] - window:
-            own[HOLD] = min(own[HOLD], own[PHASE])
         if words[k, KIND] == REST and words[k, EPOCH] == max(own[EPOCH], epoch):
             resting += 1
         elif behind < 0:
@@ -508,7 +509,7 @@ def supervisor_step(schedule: Schedule, clock: float, wanted: bool, words: Float
     if unfit >= 0:
         return DEPARTS, unfit
     if first >= schedule.ends[-1]:
-        return (WAITS, away) if away >= 0 else (ARRIVED, -1)
+        return (GOES, away) if away >= 0 else (ARRIVED, -1)
     if not wanted:
         return HELD, -1
     cell = words[lowest, CELL]

@@ -54,9 +54,11 @@ def _setting_faults(scenario: Scenario) -> Faults:
         if not scenario.ideal or scenario.deployment.budget != "none":
             said = "rest; pass needs a scenario without deployment, whose grasps are joints"
             yield "planner.hand_over", "pass", said
-        if scenario.control.hold is not None:
-            yield "planner.hand_over", "pass", "rest; pass needs a scenario without control.hold"
     hold = scenario.control.hold
+    if hold is not None and scenario.planner.hand_over == "pass":
+        for key in ("energy", "silence"):
+            if (stated := getattr(hold, key)) is not None:
+                yield f"control.hold.{key}", stated, "null with planner.hand_over: pass"
     if hold is not None and hold.silence is not None and scenario.deployment.control_rate is None:
         yield "control.hold.silence", hold.silence, "null without deployment.control_rate"
 

@@ -181,9 +181,6 @@ PATIENCE_ALLOWANCE = 20.0
 
 def patience(plan: Plan, cell: int) -> float:
     """Return the longest time that a transition is waited for [s]."""
-    if plan.motion is not None:
-        begin, end = plan.motion.windows[cell].tolist()
-        return float(end - begin) + PATIENCE_ALLOWANCE
     return PATIENCE_FACTOR * plan.transitions[cell].estimated_time + PATIENCE_ALLOWANCE
 
 
@@ -198,6 +195,8 @@ def blocking_margin(plan: Plan, sample: Sample, goal: readiness.ArrivalGoal) -> 
     if sample.held:
         return f"the hold ends: {_causes_of(sample)}"
     last = sample.cell == len(plan.cells) - 1
+    if sample.phases.size and not last:
+        return f"the motion goes on from the phase {sample.phases[:, 0].min():.6g} s"
     margins = _arrival(plan, sample, goal) if last else _readiness(plan, sample)
     if last and min(margins.values()) >= 0.0 > min(sample.ready_margins):
         k = int(np.argmin(sample.ready_margins))
@@ -362,6 +361,7 @@ class Watch:
         self._goal = goal
         self._last: Sample | None = None
         self._asked_since: float | None = None
+        self._moved = 0.0
 
     @property
     def ended(self) -> bool:
@@ -385,11 +385,20 @@ class Watch:
             self.violation = f"at t = {sample.time:.6g} s in cell {sample.cell}: {asking}"
         elif sample.arrived:
             self._see_arrival(sample)
-        elif sample.time - sample.entry - sample.clock_lag > patience(self._loop.plan, sample.cell):
+        elif self._stalls(sample):
             self.give_up("stalled")
         if not self.ended:
             return None
         return EventStatus.ReachedTermination(self._loop.diagram, self.violation or "arrived")
+
+    def _stalls(self, sample: Sample) -> bool:
+        """Whether the team will hardly go on: it is too long in its cell, or rests on its motion untold."""
+        if not sample.phases.size:
+            waited = sample.time - sample.entry - sample.clock_lag
+            return waited > patience(self._loop.plan, sample.cell)
+        if sample.phases[:, 1].any() or sample.causes[0] == TOLD:
+            self._moved = sample.time
+        return sample.time - self._moved > PATIENCE_ALLOWANCE
 
     def _beyond_holding(self, sample: Sample) -> str | None:
         """Return why a robot's monitor ends the run, None where it does not.

@@ -29,7 +29,8 @@ class Sample:
     axis, and what columns are made of: the time of the sample [s], the index of the cell and the time at
     which it was entered [s], z and its rates, both of shape (3 + n,), the causes of a hold as the supervisor
     shows them, of shape (0,) where it cannot be held, what every robot's monitor of departures says, of shape
-    (N, 3), or (0, 3) where there is none, and whether all robots report arrival.
+    (N, 3), or (0, 3) where there is none, and whether all robots report arrival. Where robots of a team that
+    passes from cell to cell are in different cells, the cell is the earliest of these.
     """
 
     time: float
@@ -57,6 +58,7 @@ class Sample:
     causes: FloatArray
     alarms: FloatArray
     arrived: bool
+    phases: FloatArray
 
 
 def largest_difference(rows: FloatArray, others: FloatArray) -> float:
@@ -94,7 +96,8 @@ class Telemetry:
         at = {name: row[place] for name, place in self._places.items()}
         state = team.plant.GetPositionsAndVelocities(self._plant_context)[self._own]
         z, errors = state[: self._z], team.grasps.errors(self._plant_context)
-        cell, entry, arrived = at["instant"].tolist()
+        cell = at["cells"][:, 0].min()
+        entry = float(at["cells"][at["cells"][:, 0] == cell, 1].max())
         return Sample(
             time=self._root.get_time(),
             cell=int(cell),
@@ -120,7 +123,8 @@ class Telemetry:
             clock_lag=float(at["clock_lag"].sum()),
             causes=at["causes"],
             alarms=at["alarms"],
-            arrived=bool(arrived),
+            arrived=bool(at["arrived"][0]),
+            phases=at["phases"],
         )
 
 
@@ -131,7 +135,8 @@ def _places(loop: Loop, ports: PortRow) -> dict[str, IntArray]:
     nothing = np.empty(0, dtype=np.intp)
     lower, upper = zip(*(np.split(own["funnels"], 2) for own in robots), strict=True)
     return {
-        "instant": np.concatenate([supervisor["current_cell"], supervisor["arrived"]]),
+        "cells": np.array([one["current_cell"] for one in (supervisor, *robots) if "current_cell" in one]),
+        "arrived": supervisor["arrived"],
         "base_poses": np.array([state[:3] for state in states]),
         "governors": np.array([own["governor_position"] for own in robots]),
         "funnel_lower": _of_all_axes(lower),
@@ -145,6 +150,7 @@ def _places(loop: Loop, ports: PortRow) -> dict[str, IntArray]:
         "ready_margins": np.array([own["ready"][1] for own in robots]),
         "clock_lag": robots[0].get("clock", nothing)[:1],
         "causes": supervisor.get("causes", nothing),
+        "phases": np.concatenate([nothing, *(own.get("phase", nothing) for own in robots)]).reshape(-1, 3),
         "alarms": np.concatenate([nothing, *(own.get("alarm", nothing) for own in robots)]).reshape(-1, 3),
     }
 

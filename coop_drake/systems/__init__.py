@@ -26,9 +26,10 @@ from coop_drake.systems.measurements import (
 )
 from coop_drake.systems.messages import Exchange, Interruption, MessageChannel, TeamLink
 from coop_drake.systems.monitors import ArrivalMonitor, DepartureMonitor, MonitoredRobot
-from coop_drake.systems.motion import MotionAxes, MotionGovernor, PassingMonitor
+from coop_drake.systems.motion import MotionFollower, PassingMonitor
 from coop_drake.systems.ppc import AxisLaw, AxisMotion, AxisPpc, NominalAxes, axis_laws
 from coop_drake.systems.readiness import CellPlanner, ReadyMonitor
+from coop_drake.systems.words import Radio, RobotWords, WordPlanner
 
 __all__ = [
     "CLOCK_SIZE",
@@ -57,23 +58,25 @@ __all__ = [
     "MeasurementNoise",
     "MessageChannel",
     "MonitoredRobot",
-    "MotionAxes",
-    "MotionGovernor",
+    "MotionFollower",
     "NominalAxes",
     "NominalGovernor",
     "NominalMotion",
     "ObjectEstimator",
     "PassingMonitor",
     "Pushes",
+    "Radio",
     "ReadyMonitor",
     "ReferenceGovernor",
     "RobotEffort",
+    "RobotWords",
     "ShiftedMeasurement",
     "StatePredictor",
     "Sticking",
     "TeamLink",
     "TeamSensor",
     "WheelSlips",
+    "WordPlanner",
     "WrenchLaw",
     "axis_laws",
     "build_selector",

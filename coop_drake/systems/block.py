@@ -25,12 +25,17 @@ REQUEST_SIZE = 2
 CLOCK_SIZE = 3
 """Size of a clock's output: lag [s], pace [-] and its derivative [1/s]."""
 
+PHASE_SIZE = 3
+"""Size of a phase on a motion: phase [s], pace [-] and its rate [1/s]."""
+
 ALARM_SIZE = 3
 """Size of what a monitor says: 0 while it is quiet, 1 where it asks for a hold, 2 where the drives shall
 brake; the largest departure over its level; and the number of this level [-]."""
 
 
-def robot_record(joints: int, *, holds: bool, monitored: bool = False) -> dict[str, int]:
+def robot_record(
+    joints: int, *, holds: bool, monitored: bool = False, passes: bool = False
+) -> dict[str, int]:
     """Return the names and sizes of the outputs of a robot with n joints that are logged."""
     return {
         "governor_position": 2,
@@ -41,6 +46,8 @@ def robot_record(joints: int, *, holds: bool, monitored: bool = False) -> dict[s
         "ready": READY_SIZE,
         "clock": CLOCK_SIZE if holds else 0,
         "alarm": ALARM_SIZE if monitored else 0,
+        "current_cell": CURRENT_CELL_SIZE if passes else 0,
+        "phase": PHASE_SIZE if passes else 0,
     }
 
 

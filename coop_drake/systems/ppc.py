@@ -20,7 +20,8 @@ from coop_drake.laws.axis_table import (
     write_jumps,
 )
 from coop_drake.laws.gains import TransitionGains
-from coop_drake.laws.nominal import carry_axes, place_on_axes, pull_axes
+from coop_drake.laws.motion import place_on_axes
+from coop_drake.laws.nominal import carry_axes, pull_axes
 from coop_drake.laws.ppc import Funnel
 from coop_drake.systems.block import CLOCK_SIZE, CURRENT_CELL_SIZE, READY_SIZE, Block, clock_of, index_of
 from coop_drake.tree.arrays import FloatArray

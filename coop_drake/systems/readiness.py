@@ -106,10 +106,6 @@ class ReadyMonitor(Block):
             report[1] = report[1] if quiet else min(report[1], FAR)
 
 
-NEVER = 1e9
-"""Period of what happens once [s]."""
-
-
 class CellPlanner(Block):
     """Advances to the next cell of the plan when all robots are ready to leave the current one.
 
@@ -131,16 +127,12 @@ class CellPlanner(Block):
         robots: Number of robots N.
         cells: Number of cells of the plan.
         period: Time between updates [s], None for every step.
-        entries: Where the team passes from cell to cell, when its motion enters the second cell, the third
-            one and so on [s]: updates are made then, and the simulator's steps end there.
 
     Raises:
         ValueError: A count is not positive, or the period is not.
     """
 
-    def __init__(
-        self, robots: int, cells: int, *, period: float | None = None, entries: Sequence[float] = ()
-    ) -> None:
+    def __init__(self, robots: int, cells: int, *, period: float | None = None) -> None:
         super().__init__()
         if robots < 1 or cells < 1:
             raise ValueError(f"CellPlanner needs at least one robot and one cell, not {robots} and {cells}")
@@ -155,10 +147,7 @@ class CellPlanner(Block):
         # It depends on the state alone: the ready reports, which depend on it, close no algebraic loop.
         self.declare_kept("current_cell", CURRENT_CELL_SIZE)
         self.DeclareVectorOutputPort("arrived", 1, self._write_arrived)
-        if not entries:
-            self.declare_update(self._advance, period)
-        for entry in entries:
-            self.declare_update(self._advance, NEVER, entry)
+        self.declare_update(self._advance, period)
 
     def _left_by_all(self, context: Context) -> float:
         """Return the index of the cell that all robots are ready to leave, -1 if some robot is not ready."""

@@ -16,6 +16,7 @@ from coop_drake.geometry.polygons import edges_of
 from coop_drake.laws import acceleration_at, actuators, nominal, total_wrench, wrench_share
 from coop_drake.laws.axis_table import DECAY_RATE, FADING_TIME, LAW_COLUMNS, RAMP_RATE, bounds_of
 from coop_drake.laws.governor import governed_acceleration
+from coop_drake.laws.motion import place_on_axes
 from coop_drake.laws.robot_dynamics import (
     end_effector_command,
     motion_room,
@@ -131,7 +132,7 @@ def test_the_base_of_every_robot_turns_with_the_object_and_against_its_joints():
         read_robot(base.chain, base.yaw, base.joints, motion_room(base.chain), state, expected)
         own = np.ascontiguousarray(axes[:, [0, *range(1 + robot.q_slice.start, 1 + robot.q_slice.stop)]])
         found[[0, 1]], found[[5, 6]] = away, away
-        nominal.place_on_axes(own, base.mounting, found)
+        place_on_axes(own, base.mounting, found)
         found[2] = np.angle(np.exp(1j * found[2]))
         np.testing.assert_allclose(found[[2, 3, 4, 7, 8, 9]], expected[[2, 3, 4, 7, 8, 9]], atol=1e-12)
         np.testing.assert_array_equal(found[[0, 1, 5, 6]], [*away, *away])

@@ -307,7 +307,7 @@ def test_a_team_has_arrived_when_all_measure_that_they_are_at_the_goal():
     team.alarms[1] = w.QUIET
     team.until(lambda team: team.time > team.schedule.ends[-1] + 0.5)
     assert team.kinds == [w.REST] * 3
-    assert team.code == (w.WAITS, 1)
+    assert team.code == (w.GOES, 1)
     team.alarms[1] = w.THERE
     team.until(arrived)
     assert team.words[0, 0, w.EPOCH] == 1.0

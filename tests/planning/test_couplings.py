@@ -11,7 +11,7 @@ from coop_drake.answers.budget import Budget
 from coop_drake.answers.plan import Cell
 from coop_drake.diagram.robot_controller import RobotKnowledge
 from coop_drake.laws.couplings import disagreement_coupling, rate_terms
-from coop_drake.laws.nominal import place_on_axes
+from coop_drake.laws.motion import place_on_axes
 from coop_drake.laws.robot_dynamics import end_effector_command, motion_room, robot_effort
 from coop_drake.plant import base_chain, build_robot_plant, build_team_plant, robot_chain
 from coop_drake.plant.component_tree import read_component_tree

@@ -464,13 +464,12 @@ def check_handovers(rows: Rows, *, exact: bool) -> list[Check]:
             text = f"and all before in cell {k} are negative, but the cell is left"
             raise RefusalError(where, f"at t = {log.times[members[-1]]:.6g} s: {text}")
     name = "cells were entered one by one, each when all robots were ready"
-    checks = [Check(name, len(rows.entries), arrays=("cell_index", "transition_start"))]
-    if plan.motion is None:
-        shares = [float(_share(rows, k, i).max()) for k, i in enumerate(rows.entries, 1)]
-        used = "share of the energy, or of the departure from rest, "
-        used += "that the axes may have when a cell is entered"
-        checks.append(Check(used, len(shares), max(shares, default=None), "of the bound, largest"))
-    return checks
+    shares = [float(_share(rows, k, i).max()) for k, i in enumerate(rows.entries, 1)]
+    used = "share of the energy, or of the departure from rest, that the axes may have when a cell is entered"
+    return [
+        Check(name, len(rows.entries), arrays=("cell_index", "transition_start")),
+        Check(used, len(shares), max(shares, default=None), "of the bound, largest"),
+    ]
 
 
 def _share(rows: Rows, cell: int, row: int) -> FloatArray:

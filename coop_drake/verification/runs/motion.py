@@ -8,10 +8,14 @@ from scipy.interpolate import BSpline
 from coop_drake.answers.motion import Motion
 from coop_drake.answers.problem import PlanningProblem
 from coop_drake.errors import RefusalError
+from coop_drake.laws.words import CLOCK_ERROR, WORD_PERIOD
 from coop_drake.tree.arrays import FloatArray
 from coop_drake.verification.checks import Check
 from coop_drake.verification.runs.laws import DRIVEN, ROUNDING, SAME, STEP, arriving, signed_distances
 from coop_drake.verification.runs.rows import Rows
+
+PHASE, PACE, RATE = range(3)
+"""Columns of a robot's phase."""
 
 
 def check_followed(rows: Rows, problem: PlanningProblem, *, exact: bool) -> list[Check]:
@@ -25,32 +29,15 @@ def check_followed(rows: Rows, problem: PlanningProblem, *, exact: bool) -> list
     Raises:
         RefusalError: Names the first entry for which a statement does not hold.
     """
-    motion = rows.plan.motion
+    motion, log = rows.plan.motion, rows.log
     assert motion is not None  # the caller asks for no other run
-    log, plan = rows.log, rows.plan
-    nominal, velocity, acceleration = _at(motion, log.times)
-    bounds = np.array([[cell.lower, cell.upper] for cell in plan.cells])[log.cell_index]
-    largest = max(
-        rows.require_same("funnel_lower", bounds[:, 0], ROUNDING),
-        rows.require_same("funnel_upper", bounds[:, 1], ROUNDING),
-    )
-    arrays = ("funnel_lower", "funnel_upper")
-    checks = [
-        Check("stated funnels are the cells", 2 * bounds[:, 0].size, largest, "largest difference", arrays)
-    ]
-    largest = rows.require_same("governor_position", nominal[:, :2], SAME)
-    rows.require_same("governor_spread", np.zeros(len(log.times)), SAME)
+    checks = [check_phases(rows, motion, exact=exact), _check_cells(rows, motion, exact=exact)]
+    nominal, velocity, acceleration = _at(motion, log.phases[:, 0])
+    positions = np.stack([_at(motion, log.phases[:, k])[0][:, :2] for k in range(log.phases.shape[1])])
+    largest = rows.require_same("governor_position", positions[0], SAME)
+    rows.require_same("governor_spread", np.abs(positions - positions[0]).max(axis=(0, 2)), SAME)
     arrays = ("governor_position", "governor_spread")
     checks.append(Check("the reference is the plan's motion", log.times.size, largest, "m, largest", arrays))
-    entered, windows = log.times[rows.entries], motion.windows
-    late, left = entered - windows[1:, 0], windows[:-1, 1] - entered
-    for k in np.flatnonzero((late < -SAME) | (left < -SAME)):
-        text = f"is entered at {entered[k]:.9g} s; the motion is in both cells from {windows[k + 1, 0]:.9g} s"
-        raise RefusalError(f"cell_index[{rows.entries[k]}]", f"cell {k + 1} {text} to {windows[k, 1]:.9g} s")
-    name = "cells were entered while the motion lay in both cells"
-    checks.append(
-        Check(name, len(entered), float(left.min(initial=np.inf)), "s, least time left in the earlier cell")
-    )
     away = float(np.hypot(*(rows.z[:, :2] - nominal[:, :2]).T).max())
     turned = float(np.abs(rows.z[:, 2:] - nominal[:, 2:]).max())
     checks.append(Check("largest departure of the object from the motion", log.times.size, away, "m"))
@@ -64,12 +51,84 @@ def check_followed(rows: Rows, problem: PlanningProblem, *, exact: bool) -> list
     return checks
 
 
-def _at(motion: Motion, times: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return the motion, its rate and its acceleration, (T, 3 + n) each; it rests after its end."""
+def check_phases(rows: Rows, motion: Motion, *, exact: bool) -> Check:
+    """Check that the phases of all robots are such as their words allow, and agree but for their clocks.
+
+    With the pace rho, 0 <= rho <= 1, sigma' = rho and -kappa <= rho' <= alpha (1 - rho^2), kappa being that of
+    the stops that may end after sigma; a robot that creeps to another one keeps |rho'| <= alpha (1 - rho^2).
+    At phase 0 and at the end, where the motion is at rest, the pace may jump.
+
+    Raises:
+        RefusalError: Names the first entry for which a statement does not hold.
+    """
+    log, count = rows.log, len(rows.log.robot_names)
+    if log.phases.shape != (len(log.times), count, 3):
+        raise RefusalError("phases", f"has the shape {log.phases.shape}; the plan's motion needs a phase a robot")
+    phase, pace, rate = np.moveaxis(log.phases, 2, 0)
+    rows.require_same("phases", np.zeros((1, count, 3)), 0.0)
+    last = log.phases[-1]
+    if not np.abs(last - [motion.duration, 0.0, 0.0]).max() <= SAME:
+        raise RefusalError(f"phases[{len(log.times) - 1}]", f"is {last.tolist()}; expected rest at the end")
+    begins, ends = np.append(-np.inf, motion.windows[:-1, 0] + motion.waiting)[:-1], motion.windows[:-1, 1]
+    acting = (begins <= phase[..., None] + SAME) & (phase[..., None] <= ends + SAME)
+    stopping = (acting * motion.rates[:-1]).max(axis=2, initial=0.0)
+    starting = motion.start_rate * (1.0 - pace * pace)
+    held = (pace >= 0.0) & (pace <= 1.0)
+    held &= (rate <= starting + SAME) & (rate >= -np.maximum(stopping, starting) - SAME)
+    text = "is {:.9g} s with the pace {:.9g} and its rate {:.9g}; the words allow no such"
+    rows.require(held, "phases", text, phase, pace, rate)
+    h, hardest = rows.steps[:, None], max(motion.start_rate, float(motion.rates.max(initial=0.0)))
+    went, paced = np.diff(phase, axis=0), np.diff(pace, axis=0)
+    starts = (phase[:-1] == 0.0) & (pace[:-1] == 0.0)
+    jumps = starts | (phase[1:] >= motion.duration - SAME)
+    off = np.where(jumps, np.maximum(went - h, -went), np.abs(went - 0.5 * h * (pace[1:] + pace[:-1])))
+    allowed = np.where(jumps, 0.0, 0.25 * h * h * hardest) + SAME
+    text = "went on by {:.9g} s, which its paces do not allow"
+    rows.require((off <= allowed) & (jumps | (np.abs(paced) <= h * hardest + SAME)), "phases", text, went, first=1)
+    parted = np.ptp(phase, axis=1)
+    text = "of robots differ by {:.9g} s"
+    rows.require(parted <= (0.0 if exact else 2.0 * CLOCK_ERROR) + SAME, "phases", text, parted)
+    name = "phases are such as words allow, and those of all robots agree"
+    return Check(name, phase.size, float(parted.max()), "s, largest difference", ("phases",))
+
+
+def _check_cells(rows: Rows, motion: Motion, *, exact: bool) -> Check:
+    """Check cells and their times by the phases, the stated funnels, and that the team rests where it is held."""
+    log, plan = rows.log, rows.plan
+    least, most = log.phases[..., PHASE].min(axis=1), log.phases[..., PHASE].max(axis=1)
+    bounds = np.array([[cell.lower, cell.upper] for cell in plan.cells])
+    # By clocks that differ some robots may be in the next cell already.
+    later = bounds if exact else np.append(bounds[1:], bounds[-1:], axis=0)
+    for name, side in (("funnel_lower", 0), ("funnel_upper", 1)):
+        own, following = bounds[log.cell_index, side], later[log.cell_index, side]
+        stated = getattr(log, name)
+        difference = np.minimum(np.abs(stated - own), np.abs(stated - following))
+        rows.require(difference <= ROUNDING, name, "is {:.9g}; that of the cell is {:.9g}", stated, own)
+    where = len(log.times) - 1
+    if log.cell_index[-1] != len(plan.cells) - 1:
+        raise RefusalError(f"cell_index[{where}]", f"is {log.cell_index[-1]}; expected the last cell")
+    entered, windows = rows.entries, motion.windows
+    rows.require_same("transition_start", np.append(0.0, log.times[entered])[log.cell_index], 0.0)
+    since, left = least[entered] - windows[1:, 0], windows[:-1, 1] - most[entered]
+    longest = WORD_PERIOD if exact else np.inf
+    for k in np.flatnonzero((since < -SAME) | (left < -SAME) | (since > longest + SAME)):
+        text = f"is entered at the phases {least[entered[k]]:.9g} s to {most[entered[k]]:.9g} s; the motion is in "
+        text += f"both cells from {windows[k + 1, 0]:.9g} s to {windows[k, 1]:.9g} s"
+        raise RefusalError(f"cell_index[{entered[k]}]", f"cell {k + 1} {text}")
+    rows.require_same("clock_lag", np.zeros(len(log.times)), 0.0)
+    rests = (log.held == 0.0) | ((log.held == 1.0) & (log.phases[..., PACE] == 0.0).all(axis=1))
+    rows.require(rests, "held", "is {}; it is 1 only where all rest", log.held)
+    arrays = ("cell_index", "transition_start", "funnel_lower", "funnel_upper", "clock_lag")
+    name = "cells were entered while the motion lay in both, and are the stated funnels"
+    return Check(name, len(entered), float(left.min(initial=np.inf)), "s, least time left in the earlier", arrays)
+
+
+def _at(motion: Motion, phases: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return the motion, its rate and its acceleration at phases, (T, 3 + n) each; it rests after its end."""
     spline = BSpline(motion.period * (np.arange(len(motion.points) + 4) - 3.0), motion.points, 3)
-    within = np.clip(times, 0.0, motion.duration)
-    moving = (times < motion.duration)[:, None]
-    return spline(within), moving * spline(within, 1), moving * spline(within, 2)
+    within, (pace, rate) = np.clip(phases[:, PHASE], 0.0, motion.duration), phases[:, PACE:].T[..., None]
+    slope = spline(within, 1)
+    return spline(within), pace * slope, pace * pace * spline(within, 2) + rate * slope
 
 
 def _check_law(
@@ -103,10 +162,10 @@ def _check_margin(rows: Rows, motion: Motion, nominal: FloatArray, velocity: Flo
 
 
 def _check_reports(rows: Rows, motion: Motion, problem: PlanningProblem) -> Check:
-    """Check the reports: the time since the next cell was entered, and in the last one arrival."""
+    """Check the reports: the phase since the next cell was entered, and in the last one arrival."""
     log, last = rows.log, len(rows.plan.cells) - 1
     entered = np.append(motion.windows[1:, 0], motion.duration)[log.cell_index]
-    margins = np.repeat((log.times - entered)[:, None], len(log.robot_names), axis=1)
+    margins = log.phases[..., PHASE] - entered[:, None]
     members = log.cell_index == last
     of_object, of_axes = arriving(rows, members, problem.position_tolerance)
     joints = problem.tree.joints

@@ -186,14 +186,10 @@ def _taken_as_logged(log: SimulationLog, checks: Sequence[Check]) -> list[str]:
 def _check_laws(rows: Rows, between: Between, problem: PlanningProblem, setup: RunSetup) -> list[Check]:
     """Check what a run states about the plan's laws: cells, funnels, reports and entries into cells."""
     checks = [*check_cells(rows, between), check_stated_funnels(rows)]
+    if rows.plan.motion is not None:
+        return [*checks, *check_followed(rows, problem, exact=setup.exact)]
     never_held = not setup.can_be_held and rows.plan.budget is None
     checks.append(check_clock(rows, one_hold=setup.one_hold, never_held=never_held))
-    if rows.plan.motion is not None:
-        return [
-            *checks,
-            *check_followed(rows, problem, exact=setup.exact),
-            *check_handovers(rows, exact=setup.exact),
-        ]
     if setup.one_clock:
         checks += check_funnels(rows, between)
     if setup.exact:

@@ -1,0 +1,237 @@
+"""What a team says that does not stop at every cell: one block for each robot, and one for the supervisor."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import inf
+
+import numpy as np
+from pydrake.systems.framework import BasicVector, Context, DiscreteValues, State
+
+from coop_drake.laws import readiness
+from coop_drake.laws.measurements import period_of, uniform_pair
+from coop_drake.laws.words import (
+    ARRIVED,
+    ASKS,
+    BRAKES,
+    DEPARTS,
+    EPOCH,
+    HELD,
+    HOLD,
+    MOTION_SIZE,
+    QUIET,
+    THERE,
+    WAITS,
+    WORD_SIZE,
+    Schedule,
+    first_motion,
+    first_words,
+    hear,
+    phase_at,
+    robot_step,
+    supervisor_step,
+)
+from coop_drake.systems.block import ALARM_SIZE, CURRENT_CELL_SIZE, PHASE_SIZE, READY_SIZE, Block
+from coop_drake.systems.holds import ASKED, BRAKED, SILENT, TOLD
+from coop_drake.tree.arrays import FloatArray
+
+_EARLY = 1e-6
+"""Share of a period by which an interval begins and ends earlier: times of samples round [-]."""
+
+_CELL, _SAID, _PAST = MOTION_SIZE, MOTION_SIZE + CURRENT_CELL_SIZE, MOTION_SIZE + CURRENT_CELL_SIZE + 1
+"""Where in a robot's state, behind words and motion, the current cell stands, what the monitor says, and the
+last phases."""
+
+_ALARMS = {readiness.QUIET: QUIET, readiness.ASKS: ASKS}
+"""What a monitor of departures says, as the words have it; all else lets the drives brake."""
+
+
+@dataclass(frozen=True)
+class Radio:
+    """How one robot, or the supervisor, hears and speaks.
+
+    Attributes:
+        row: Its row of the words, N for the supervisor.
+        robots: Number of robots N.
+        kept: How many of everybody's last rows are under way at most [-].
+        late: By how many samples later it hears a row than without delay [-].
+        loss: Probability with which a row is lost [-].
+        seeds: Of the losses of the words of everybody.
+        clock_error: By how much its clock is ahead [s].
+        offset: When it samples first [s].
+        deaf: When it hears nothing: begin and end [s].
+        mute: When nothing that it says reaches anybody: begin and end [s].
+    """
+
+    row: int
+    robots: int
+    kept: int = 1
+    late: int = 0
+    loss: float = 0.0
+    seeds: Sequence[int] = ()
+    clock_error: float = 0.0
+    offset: float = 0.0
+    deaf: tuple[float, float] = (inf, inf)
+    mute: tuple[float, float] = (inf, inf)
+
+
+class _Speaker(Block):
+    """Hears, decides and speaks once in a period; a subclass decides.
+
+    All decide in unrestricted updates, which Drake makes before the discrete ones of the same instant, each
+    with what the others said a period before. So a robot measures and commands by what it has just decided.
+    """
+
+    def __init__(self, schedule: Schedule, radio: Radio, more: FloatArray) -> None:
+        super().__init__()
+        self._schedule, self._radio = schedule, radio
+        words, nodes = first_words(schedule, radio.robots), radio.robots + 1
+        sent = np.tile(words[radio.row], radio.kept)
+        self._heard = words.size
+        self._more = words.size + sent.size
+        self._words = self.DeclareVectorInputPort("words", nodes * sent.size)
+        self.DeclareDiscreteState(np.concatenate([words.ravel(), sent, more]))
+        self.declare_kept("said", sent.size, first=words.size)
+        self.DeclarePeriodicUnrestrictedUpdateEvent(
+            schedule.period, radio.offset, self._loosely(self._hear_and_speak)
+        )
+
+    def _decide(self, context: Context, words: FloatArray, more: FloatArray) -> None:
+        """Change the own row of the words, and the rest of the state."""
+        raise NotImplementedError
+
+    def _hear_and_speak(self, context: Context, state: State) -> None:
+        values = state.get_mutable_discrete_state().get_mutable_vector().get_mutable_value()
+        words, radio = values[: self._heard].reshape(-1, WORD_SIZE), self._radio
+        now = context.get_time() + _EARLY * self._schedule.period
+        if not radio.deaf[0] <= now < radio.deaf[1]:
+            said = np.array(self._words.Eval(context)).reshape(len(words), radio.kept, WORD_SIZE)
+            number = period_of(context.get_time(), self._schedule.period, radio.offset)
+            for sender in range(len(words)):
+                if sender != radio.row and not self._loses(sender, number):
+                    hear(words, sender, said[sender, radio.late])
+        self._decide(context, words, values[self._more :])
+        sent = values[self._heard : self._more].reshape(-1, WORD_SIZE)
+        sent[1:] = sent[:-1].copy()
+        if not radio.mute[0] <= now < radio.mute[1]:
+            sent[0] = words[radio.row]
+
+    def _loses(self, sender: int, number: int) -> bool:
+        loss = self._radio.loss
+        return loss > 0.0 and uniform_pair(self._radio.seeds[sender], number)[0] < loss
+
+
+class RobotWords(_Speaker):
+    """Where on the motion a robot is: it hears the others, and says what it does, see ``laws/words.py``.
+
+    ======= ================== ================ =========================================================
+    input   ``words``          (N + 1) m 9      the last m rows that everybody sent, the newest first
+    input   ``ready``          2                the robot's own report: cell index, margin
+    input   ``alarm``          3                what ``DepartureMonitor`` says; only with ``alarmed``
+    output  ``said``           9 m              the last m rows that the robot sent
+    output  ``phase``          3                phase sigma [s], pace rho [-] and its rate [1/s] now
+    output  ``current_cell``   2                index of the cell that the phase was in at the last sample, time
+                                                of the sample at which that was entered [-, s]
+    output  ``stamped_phase``  3                the phase when what is used now was measured, with pace and rate;
+                                                only with ``ahead``
+    output  ``phase_ahead``    3                the same for the time at which commands of now act; likewise
+    ======= ================== ================ =========================================================
+
+    State: one discrete group. Words are updated every period before others measure and command: all words
+    that were heard, the rows that were sent, the motion (see ``MOTION_SIZE``), the cell and its entry, then
+    phase, pace and rate at the last samples. What the monitor says is taken after that, for the next period.
+
+    Args:
+        schedule: What the plan states.
+        radio: How the robot hears and speaks.
+        alarmed: Whether a monitor of departures asks for holds.
+        ahead: How long after a sample its commands act, on average [s]; None in continuous time.
+        age: Age of the measurements in samples [-].
+    """
+
+    def __init__(
+        self, schedule: Schedule, radio: Radio, *, alarmed: bool = False, ahead: float | None = None,
+        age: int = 0,
+    ) -> None:  # fmt: skip
+        first = [*first_motion(), 0.0, 0.0, float(QUIET), *[0.0] * (1 + age) * PHASE_SIZE]
+        super().__init__(schedule, radio, np.array(first))
+        self._last, self._ahead = schedule.ends.size - 1, ahead
+        self._ready = self.DeclareVectorInputPort("ready", READY_SIZE)
+        self._alarm = self.DeclareVectorInputPort("alarm", ALARM_SIZE) if alarmed else None
+        timed = {self.xd_ticket(), self.time_ticket()}
+        self.DeclareVectorOutputPort("phase", PHASE_SIZE, self._write_phase, timed)
+        self.declare_kept("current_cell", CURRENT_CELL_SIZE, first=self._more + _CELL)
+        if ahead is not None:
+            self.declare_kept("stamped_phase", PHASE_SIZE, first=self._more + _PAST + age * PHASE_SIZE)
+            self.DeclareVectorOutputPort("phase_ahead", PHASE_SIZE, self._write_ahead, timed)
+        self.declare_update(self._judge, schedule.period, radio.offset)
+
+    def _decide(self, context: Context, words: FloatArray, more: FloatArray) -> None:
+        schedule, radio, time = self._schedule, self._radio, context.get_time()
+        clock, motion, cell, past = time + radio.clock_error, more[:_CELL], more[_CELL:_SAID], more[_PAST:]
+        now = robot_step(schedule, clock, int(more[_SAID]), radio.row, motion, words)
+        past[PHASE_SIZE:] = past[:-PHASE_SIZE].copy()
+        past[:PHASE_SIZE] = now
+        index = max(int(np.searchsorted(schedule.begins, now[0], side="right")) - 1, 0)
+        if index != cell[0]:
+            cell[:] = index, time
+
+    def _judge(self, context: Context, discrete_state: DiscreteValues) -> None:
+        index, margin = self._ready.Eval(context)
+        said = THERE if index == self._last and margin >= 0.0 else QUIET
+        if self._alarm is not None and (level := self._alarm.Eval(context)[0]) > readiness.QUIET:
+            said = _ALARMS.get(level, BRAKES)
+        discrete_state.get_mutable_vector().get_mutable_value()[self._more + _SAID] = said
+
+    def _phase(self, context: Context, later: float) -> tuple[float, float, float]:
+        motion = np.array(self.kept(context)[self._more : self._more + MOTION_SIZE])
+        return phase_at(self._schedule, motion, context.get_time() + self._radio.clock_error + later)
+
+    def _write_phase(self, context: Context, output: BasicVector) -> None:
+        output.SetFromVector(self._phase(context, 0.0))
+
+    def _write_ahead(self, context: Context, output: BasicVector) -> None:
+        output.SetFromVector(self._phase(context, self._ahead or 0.0))
+
+
+class WordPlanner(_Speaker):
+    """The cell planner of a team that does not stop at every cell: it starts the team, and knows its arrival.
+
+    ======= =========== ============ ====================================================================
+    input   ``words``   (N + 1) m 9  the last m rows that everybody sent, the newest first
+    input   ``order``   1            1 where the team is told to hold, else 0 [-]; may be left out
+    output  ``said``    9 m          the last m rows that it sent
+    output  ``arrived`` 1            1 when all robots rest at the goal, else 0 [-]
+    output  ``causes``  1 + N        why the team rests or its drives brake, see ``HoldSupervisor``
+    ======= =========== ============ ====================================================================
+
+    State: one discrete group, updated every period: all words that it heard, the rows that it sent, what it
+    sees (see ``GOES``), and the robot that this is about.
+
+    Args:
+        schedule: What the plan states.
+        radio: How it hears and speaks.
+    """
+
+    def __init__(self, schedule: Schedule, radio: Radio) -> None:
+        super().__init__(schedule, radio, np.array([0.0, -1.0]))
+        self._order = self.DeclareVectorInputPort("order", 1)
+        self.DeclareVectorOutputPort("arrived", 1, self._write_arrived, {self.xd_ticket()})
+        self.DeclareVectorOutputPort("causes", 1 + radio.robots, self._write_causes, {self.xd_ticket()})
+
+    def _decide(self, context: Context, words: FloatArray, more: FloatArray) -> None:
+        wanted = not (self._order.HasValue(context) and self._order.Eval(context)[0] > 0.0)
+        more[:] = supervisor_step(self._schedule, context.get_time(), wanted, words)
+
+    def _write_arrived(self, context: Context, output: BasicVector) -> None:
+        output.SetFromVector([float(self.kept(context)[self._more] == ARRIVED)])
+
+    def _write_causes(self, context: Context, output: BasicVector) -> None:
+        state, causes = self.kept(context), output.get_mutable_value()
+        words, (seen, robot) = state[: self._heard].reshape(-1, WORD_SIZE), state[self._more :]
+        braked = (words[:-1, HOLD] == -inf) & (words[:-1, EPOCH] == words[-1, EPOCH])
+        causes[:] = TOLD if seen == HELD else 0.0, *np.where(braked, BRAKED, 0.0)
+        if seen in (DEPARTS, WAITS):
+            causes[1 + int(robot)] = ASKED if seen == DEPARTS else SILENT
+
