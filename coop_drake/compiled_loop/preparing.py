@@ -81,6 +81,8 @@ def prepare(scenario: Scenario, plan: Plan, maps: Sequence[HarmonicMap]) -> Comp
             wants.
     """
     _check(scenario)
+    if plan.motion is not None:
+        raise _refusal(scenario, "planner.hand_over", "pass", "rest")
     exact = replace(scenario, deployment=replace(scenario.deployment, mass_error=0.0))
     team = build_team_plant(scenario, DiagramBuilder())
     knowledge = robot_knowledge(exact, plan, maps, team)

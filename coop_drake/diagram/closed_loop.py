@@ -301,7 +301,7 @@ def build_closed_loop(
     *,
     replacements: Replacements | None = None,
 ) -> ClosedLoop:
-    """Build the closed loop; only ready reports, and requests for a hold if any, or words cross between robots.
+    """Build the closed loop; only words, or ready reports and requests for a hold, cross between robots.
 
     Args:
         scenario: The scenario.

@@ -541,10 +541,14 @@ def deploy(
             builder.ExportInput(controller.GetInputPort(entry), entry)
         else:
             wrapping.measure(controller.GetInputPort(entry))
-    wrapping.hear(controller.GetInputPort("current_cell"))
     effort = wrapping.command(controller.GetOutputPort("robot_effort"))
     builder.ExportOutput(effort if bodiless else wrapping.actuate(effort), "robot_effort")
-    builder.ExportOutput(wrapping.send(controller.GetOutputPort("ready")), "ready")
+    if controller.HasOutputPort("said"):  # Its words have a radio of their own.
+        builder.ExportInput(controller.GetInputPort("words"), "words")
+        builder.ExportOutput(controller.GetOutputPort("said"), "said")
+    else:
+        wrapping.hear(controller.GetInputPort("current_cell"))
+        builder.ExportOutput(wrapping.send(controller.GetOutputPort("ready")), "ready")
     held = controller.HasOutputPort("hold_request")
     if held:
         wrapping.obey(controller.GetInputPort("hold_message"))

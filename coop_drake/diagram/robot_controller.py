@@ -127,13 +127,9 @@ def robot_knowledge(
 
     Raises:
         PlanError: The plan belongs to another team, or the number of maps is not the number of cells.
-        ScenarioError: The plan's motion is for an ideal team, or words may be later than it allows.
+        ScenarioError: Words may be later than the plan's motion allows.
     """
     _check(plan, maps, team)
-    if plan.motion is not None and not scenario.ideal:
-        raise ScenarioError(
-            str(scenario.path), "planner.hand_over", "pass", "rest: the plan's motion is for an ideal team"
-        )
     cells = governed_cells(plan, maps)
     factor, deployment, control = 1.0 + scenario.deployment.mass_error, scenario.deployment, scenario.control
     hold = hold_of(scenario, plan)
@@ -180,10 +176,10 @@ def team_schedule(scenario: Scenario, plan: Plan) -> Schedule | None:
     period = deployment.period or WORD_PERIOD
     delay = 0.5 * motion.waiting - 2.0 * CLOCK_ERROR - 2.0 * period
     if delay < 0.0:
-        allowed = f"at least {4.0 / (motion.waiting - 4.0 * CLOCK_ERROR):.6g} Hz, for words of the plan's motion"
-        raise ScenarioError(
-            str(scenario.path), "deployment.control_rate", deployment.control_rate, allowed
+        allowed = (
+            f"at least {4.0 / (motion.waiting - 4.0 * CLOCK_ERROR):.6g} Hz, for words of the plan's motion"
         )
+        raise ScenarioError(str(scenario.path), "deployment.control_rate", deployment.control_rate, allowed)
     if deployment.messages.delay > delay:
         allowed = f"at most {delay:.6g} s: the plan's motion waits no longer for words"
         raise ScenarioError(

@@ -61,6 +61,8 @@ def control_period(scenario: Scenario) -> float:
         ScenarioError: Robots compute in continuous time, or not all at the same time.
     """
     deployment, period = scenario.deployment, scenario.deployment.period
+    if scenario.planner.hand_over == "pass":
+        raise ScenarioError(str(scenario.path), "planner.hand_over", "pass", "rest for robots apart")
     if period is None:
         allowed = "a number of Hz, such as 200: controllers apart from each other compute at samples"
         raise ScenarioError(str(scenario.path), "deployment.control_rate", None, allowed)

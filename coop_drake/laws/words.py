@@ -106,8 +106,8 @@ from coop_drake.tree.arrays import FloatArray
 EPOCH, PLAN, STAMP, KIND, CELL, HOLD, PHASE, TIME, FIT = range(9)
 """Columns of words: number of the start that they belong to, number of the plan, when they were said by the
 sender's clock [s], what the sender does, the cell that it has begun, where the team shall brake [s], where
-the sender rests [s], nothing, and 0 for an alarm, 1 for none, 2 for none at the goal. Of the supervisor CELL has been begun by all,
-PHASE is sigma_0 and TIME t_0 [s]."""
+the sender rests [s], nothing, and 0 for an alarm, 1 for none, 2 for none at the goal. Of the supervisor CELL
+has been begun by all, PHASE is sigma_0 and TIME t_0 [s]."""
 
 WORD_SIZE = 9
 """Number of columns of words."""
@@ -260,7 +260,7 @@ def first_motion(phase: float = 0.0) -> FloatArray:
 
 @compiled
 def started(schedule: Schedule, first: float, w: float) -> tuple[float, float, float]:
-    """Return S(w) [s], S' [-] and S'' [1/s], sigma_0 being ``first``; those of rest there before the start."""
+    """Return S(w) [s], S' [-] and S'' [1/s], sigma_0 being ``first``; before the start those of rest."""
     if not w > 0.0:
         return first, 0.0, 0.0
     if not first > 0.0:

@@ -50,12 +50,11 @@ def _setting_faults(scenario: Scenario) -> Faults:
     if scenario.gains.selected not in scenario.gains.sets:
         known = ", ".join(sorted(scenario.gains.sets))
         yield "gains.selected", scenario.gains.selected, f"a gain set, one of {known}"
-    if scenario.planner.hand_over == "pass":
-        if not scenario.ideal or scenario.deployment.budget != "none":
-            said = "rest; pass needs a scenario without deployment, whose grasps are joints"
-            yield "planner.hand_over", "pass", said
+    passes = scenario.planner.hand_over == "pass"
+    if passes and scenario.deployment.budget != "none":
+        yield "planner.hand_over", "pass", "rest; pass needs a scenario without deployment.budget"
     hold = scenario.control.hold
-    if hold is not None and scenario.planner.hand_over == "pass":
+    if hold is not None and passes:
         for key in ("energy", "silence"):
             if (stated := getattr(hold, key)) is not None:
                 yield f"control.hold.{key}", stated, "null with planner.hand_over: pass"

@@ -6,7 +6,7 @@ Margins are positive where an invariant holds.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
@@ -18,6 +18,7 @@ from coop_drake.diagram.closed_loop import Loop, PortRow
 from coop_drake.geometry.polygons import BoundaryDistance, signed_distance
 from coop_drake.laws import total_wrench
 from coop_drake.simulation.clearance import TeamClearance, team_distances
+from coop_drake.systems.block import PHASE_SIZE
 from coop_drake.tree.arrays import FloatArray, IntArray
 
 
@@ -58,7 +59,7 @@ class Sample:
     causes: FloatArray
     alarms: FloatArray
     arrived: bool
-    phases: FloatArray
+    phases: FloatArray = field(default_factory=lambda: np.empty((0, PHASE_SIZE)))
 
 
 def largest_difference(rows: FloatArray, others: FloatArray) -> float:
@@ -85,7 +86,7 @@ class Telemetry:
         rates = team.plant.num_positions() + team.velocity_index
         self._z = len(team.position_index)
         self._own = np.concatenate([team.position_index, rates])
-        self._ports = PortRow(root)
+        self._ports, self._entered = PortRow(root), (0.0, 0.0, 0.0)
         self._places = _places(loop, self._ports)
         grasps = np.array([[robot.X_LE.x, robot.X_LE.y] for robot in team.robots])
         self._load = grasps, team.object_inertia.p_LLcm
@@ -96,10 +97,13 @@ class Telemetry:
         at = {name: row[place] for name, place in self._places.items()}
         state = team.plant.GetPositionsAndVelocities(self._plant_context)[self._own]
         z, errors = state[: self._z], team.grasps.errors(self._plant_context)
-        cell = at["cells"][:, 0].min()
-        entry = float(at["cells"][at["cells"][:, 0] == cell, 1].max())
+        time, cell, entry = self._root.get_time(), at["cells"][:, 0].min(), float(at["cells"][0, 1])
+        if len(at["phases"]):  # Robots have cells of their own: the last one enters at the read before.
+            before, entry, seen = self._entered
+            entry = entry if cell == before else seen
+            self._entered = cell, entry, time
         return Sample(
-            time=self._root.get_time(),
+            time=time,
             cell=int(cell),
             entry=entry,
             z=z,

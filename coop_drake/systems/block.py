@@ -37,7 +37,7 @@ def robot_record(
     joints: int, *, holds: bool, monitored: bool = False, passes: bool = False
 ) -> dict[str, int]:
     """Return the names and sizes of the outputs of a robot with n joints that are logged."""
-    return {
+    record = {
         "governor_position": 2,
         "energy_margin": 1,
         "funnels": 2 * (1 + joints),
@@ -46,9 +46,8 @@ def robot_record(
         "ready": READY_SIZE,
         "clock": CLOCK_SIZE if holds else 0,
         "alarm": ALARM_SIZE if monitored else 0,
-        "current_cell": CURRENT_CELL_SIZE if passes else 0,
-        "phase": PHASE_SIZE if passes else 0,
     }
+    return record | ({"current_cell": CURRENT_CELL_SIZE, "phase": PHASE_SIZE} if passes else {})
 
 
 def supervisor_record(robots: int, *, holds: bool) -> dict[str, int]:

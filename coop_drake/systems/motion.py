@@ -14,7 +14,7 @@ from coop_drake.systems.block import CURRENT_CELL_SIZE, PHASE_SIZE, Block, index
 from coop_drake.systems.governor import GovernedCell
 from coop_drake.systems.ppc import AxisLaw
 from coop_drake.systems.readiness import ReadyMonitor
-from coop_drake.tree.arrays import FloatArray
+from coop_drake.tree.arrays import FloatArray, IntArray
 
 NOW, STAMPED, AHEAD = range(3)
 """Of which time the motion is: now, when what is used was measured, when commands act on average."""
@@ -30,6 +30,8 @@ class MotionFollower(Block):
     input   ``phase``                3          phase [s], pace [-] and its rate [1/s] now
     input   ``stamped_phase``        3          those when states were measured; only with ``mounting``
     input   ``phase_ahead``          3          those when commands act, on average; likewise
+    output  ``nominal_motion``                  nominal (x, y, theta, q), their rates and            W
+                                                accelerations, of one time or of all three
     output  ``governor_command``     4          nominal velocity of L's origin now [m/s], its        W
                                                 desired acceleration [m/s^2]
     output  ``governor_position``    2          nominal position of L's origin now [m]               W
@@ -37,8 +39,6 @@ class MotionFollower(Block):
     output  ``axis_acceleration``    1 + n      desired angular acceleration of the object           W
                                                 [rad/s^2], of the joints [rad/s^2 or m/s^2]
     output  ``funnels``              2 (1 + n)  lower, then upper ends of the cell [rad or m]
-    output  ``nominal_motion``                  nominal (x, y, theta, q), their rates and            W
-                                                accelerations, of one time or of all three
     output  ``object_ahead``         6          ``object_state`` with nominal angle and rate of the  W
                                                 time at which commands act; only with ``mounting``
     output  ``robot_ahead``          2 (3 + n)  ``robot_state`` likewise, with those of base and     W
@@ -94,14 +94,15 @@ class MotionFollower(Block):
     def _write_nominal(self, context: Context, output: BasicVector) -> None:
         nominal = output.get_mutable_value().reshape(self._shape)
         for port, rows in zip(self._phases, nominal, strict=True):
-            motion_at(self._motion.points, self._motion.period, *port.Eval(context), rows)
+            phase, pace, rate = port.Eval(context).tolist()
+            motion_at(self._motion.points, self._motion.period, phase, pace, rate, rows)
 
     def _at(self, context: Context, time: int) -> FloatArray:
         """Return the nominal configuration, its rate and its acceleration, shape (3, 3 + n)."""
         nominal: FloatArray = self._nominal.Eval(context).reshape(self._shape)[min(time, self._shape[0] - 1)]
         return nominal
 
-    def _pulled(self, context: Context, joints: FloatArray) -> FloatArray:
+    def _pulled(self, context: Context, joints: IntArray) -> FloatArray:
         """Return the desired accelerations of (x, y, theta), and of some joints."""
         pulled, seen = np.empty(3 + joints.size), self._object.Eval(context)
         robot = self._robot.Eval(context) if joints.size else seen
@@ -135,6 +136,7 @@ class MotionFollower(Block):
 
     def _write_robot(self, context: Context, output: BasicVector) -> None:
         shown, ahead = output.get_mutable_value(), self._at(context, AHEAD)
+        assert self._mounting is not None  # the port is declared with it alone
         shown[:] = self._robot.Eval(context)
         place_on_axes(np.ascontiguousarray(ahead[:2, [2, *self._joints]]), self._mounting, shown)
 
@@ -147,13 +149,13 @@ class PassingMonitor(ReadyMonitor):
     input   ``robot_state``          2 (3 + n)  z_k and its rate, z_k = (x, y, yaw of Bk, q_k)       W
     input   ``governor_position``    2          nominal position of L's origin [m]                   W
     input   ``current_cell``         2          index of the current cell, time of its entry [-, s]
-    input   ``phase``                3          phase [s], pace [-] and its rate [1/s] now
     input   ``arrival``              1          what ``ArrivalMonitor`` shows; only with ``measured``
+    input   ``phase``                3          phase [s], pace [-] and its rate [1/s] now
     output  ``ready``                2          index of the cell that the report is about, margin
     ======= ======================== ========== ==================================================== =====
 
-    No state. The margin is the phase less that at which the motion enters the next cell [s]; in the last one it
-    is that of ``ReadyMonitor`` once the motion has ended.
+    No state. The margin is the phase less that at which the motion enters the next cell [s]; in the last one
+    it is that of ``ReadyMonitor`` once the motion has ended.
 
     Args:
         motion: The motion.

@@ -21,6 +21,7 @@ from coop_drake.laws.words import (
     HOLD,
     MOTION_SIZE,
     QUIET,
+    STAMP,
     THERE,
     WAITS,
     WORD_SIZE,
@@ -39,7 +40,7 @@ from coop_drake.tree.arrays import FloatArray
 _EARLY = 1e-6
 """Share of a period by which an interval begins and ends earlier: times of samples round [-]."""
 
-_CELL, _SAID, _PAST = MOTION_SIZE, MOTION_SIZE + CURRENT_CELL_SIZE, MOTION_SIZE + CURRENT_CELL_SIZE + 1
+CELL, SAID, PAST = MOTION_SIZE, MOTION_SIZE + CURRENT_CELL_SIZE, MOTION_SIZE + CURRENT_CELL_SIZE + 1
 """Where in a robot's state, behind words and motion, the current cell stands, what the monitor says, and the
 last phases."""
 
@@ -125,18 +126,18 @@ class _Speaker(Block):
 class RobotWords(_Speaker):
     """Where on the motion a robot is: it hears the others, and says what it does, see ``laws/words.py``.
 
-    ======= ================== ================ =========================================================
-    input   ``words``          (N + 1) m 9      the last m rows that everybody sent, the newest first
-    input   ``ready``          2                the robot's own report: cell index, margin
-    input   ``alarm``          3                what ``DepartureMonitor`` says; only with ``alarmed``
-    output  ``said``           9 m              the last m rows that the robot sent
-    output  ``phase``          3                phase sigma [s], pace rho [-] and its rate [1/s] now
-    output  ``current_cell``   2                index of the cell that the phase was in at the last sample, time
-                                                of the sample at which that was entered [-, s]
-    output  ``stamped_phase``  3                the phase when what is used now was measured, with pace and rate;
-                                                only with ``ahead``
-    output  ``phase_ahead``    3                the same for the time at which commands of now act; likewise
-    ======= ================== ================ =========================================================
+    ======= ================== ============ =============================================================
+    input   ``words``          (N + 1) m 9  the last m rows that everybody sent, the newest first
+    input   ``ready``          2            the robot's own report: cell index, margin
+    input   ``alarm``          3            what ``DepartureMonitor`` says; only with ``alarmed``
+    output  ``said``           9 m          the last m rows that the robot sent
+    output  ``phase``          3            phase sigma [s], pace rho [-] and its rate [1/s] now
+    output  ``current_cell``   2            index of the cell that the phase was in at the last sample, and
+                                            the time of the sample at which that was entered [-, s]
+    output  ``stamped_phase``  3            the phase when what is used now was measured, with pace and rate;
+                                            only with ``ahead``
+    output  ``phase_ahead``    3            those at the time at which commands of now act; likewise
+    ======= ================== ============ =============================================================
 
     State: one discrete group. Words are updated every period before others measure and command: all words
     that were heard, the rows that were sent, the motion (see ``MOTION_SIZE``), the cell and its entry, then
@@ -161,16 +162,16 @@ class RobotWords(_Speaker):
         self._alarm = self.DeclareVectorInputPort("alarm", ALARM_SIZE) if alarmed else None
         timed = {self.xd_ticket(), self.time_ticket()}
         self.DeclareVectorOutputPort("phase", PHASE_SIZE, self._write_phase, timed)
-        self.declare_kept("current_cell", CURRENT_CELL_SIZE, first=self._more + _CELL)
+        self.declare_kept("current_cell", CURRENT_CELL_SIZE, first=self._more + CELL)
         if ahead is not None:
-            self.declare_kept("stamped_phase", PHASE_SIZE, first=self._more + _PAST + age * PHASE_SIZE)
+            self.declare_kept("stamped_phase", PHASE_SIZE, first=self._more + PAST + age * PHASE_SIZE)
             self.DeclareVectorOutputPort("phase_ahead", PHASE_SIZE, self._write_ahead, timed)
         self.declare_update(self._judge, schedule.period, radio.offset)
 
     def _decide(self, context: Context, words: FloatArray, more: FloatArray) -> None:
         schedule, radio, time = self._schedule, self._radio, context.get_time()
-        clock, motion, cell, past = time + radio.clock_error, more[:_CELL], more[_CELL:_SAID], more[_PAST:]
-        now = robot_step(schedule, clock, int(more[_SAID]), radio.row, motion, words)
+        clock, motion, cell, past = time + radio.clock_error, more[:CELL], more[CELL:SAID], more[PAST:]
+        now = robot_step(schedule, clock, int(more[SAID]), radio.row, motion, words)
         past[PHASE_SIZE:] = past[:-PHASE_SIZE].copy()
         past[:PHASE_SIZE] = now
         index = max(int(np.searchsorted(schedule.begins, now[0], side="right")) - 1, 0)
@@ -182,7 +183,7 @@ class RobotWords(_Speaker):
         said = THERE if index == self._last and margin >= 0.0 else QUIET
         if self._alarm is not None and (level := self._alarm.Eval(context)[0]) > readiness.QUIET:
             said = _ALARMS.get(level, BRAKES)
-        discrete_state.get_mutable_vector().get_mutable_value()[self._more + _SAID] = said
+        discrete_state.get_mutable_vector().get_mutable_value()[self._more + SAID] = said
 
     def _phase(self, context: Context, later: float) -> tuple[float, float, float]:
         motion = np.array(self.kept(context)[self._more : self._more + MOTION_SIZE])
@@ -232,6 +233,6 @@ class WordPlanner(_Speaker):
         words, (seen, robot) = state[: self._heard].reshape(-1, WORD_SIZE), state[self._more :]
         braked = (words[:-1, HOLD] == -inf) & (words[:-1, EPOCH] == words[-1, EPOCH])
         causes[:] = TOLD if seen == HELD else 0.0, *np.where(braked, BRAKED, 0.0)
-        if seen in (DEPARTS, WAITS):
+        # Before W has passed nobody can have been heard for long enough.
+        if seen in (DEPARTS, WAITS) and words[-1, STAMP] > self._schedule.window:
             causes[1 + int(robot)] = ASKED if seen == DEPARTS else SILENT
-

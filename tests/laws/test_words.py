@@ -341,6 +341,7 @@ def test_a_robot_whose_monitor_asks_refuses_the_start_and_the_next_one_is_taken_
     team.until(lambda team: team.words[-1, -1, w.EPOCH] == 1.0)  # said, not yet heard
     team.alarms[1] = w.ASKS
     team.until(lambda team: team.kinds[1] == w.REST and team.words[1, 1, w.EPOCH] == 1.0)
+    assert team.kinds == [w.ARMED, w.REST, w.ARMED]
     team.until(all_are(w.REST))
     assert (team.phases == 0.0).all()
     for _ in range(20):
@@ -361,6 +362,61 @@ def test_a_start_that_one_does_not_hear_is_called_off_by_everybody_without_the_s
     team.until(lambda team: team.kinds[:2] == [w.ARMED] * 2)
     team.until(all_are(w.REST))
     assert (team.phases == 0.0).all()
+
+
+def test_a_start_that_is_heard_late_is_refused_since_others_call_it_off():
+    team = Team(even_schedule(4), [0.7] * 3)
+    team.closed = {(3, 2)}
+    team.until(lambda team: team.kinds[:2] == [w.ARMED] * 2)
+    begin = team.motions[0, w.BEGIN]
+    team.until(lambda team: team.time > begin - 1.5 * team.schedule.window)
+    team.closed = set()
+    team.step()
+    team.closed = {(i, j) for i in range(4) for j in range(4) if i != j and 2 in (i, j)}
+    rows = team.until(lambda team: team.time > begin + 1.0)
+    assert team.kinds == [w.REST] * 3
+    assert (rows[:, :, 0] == 0.7).all()
+
+
+def test_no_start_leads_beyond_the_cell_after_the_least_begun():
+    """Neither does the supervisor say such a start, nor does a robot take it."""
+    schedule = even_schedule(6)
+    for phase, starts in ((schedule.ends[2], True), (schedule.ends[2] + 1e-6, False)):
+        words = w.first_words(schedule, 2, phase)
+        words[:2, w.CELL], words[:2, w.FIT], words[:2, w.STAMP] = [2.0, 1.0], 1.0, 0.0
+        order = words.copy()
+        assert w.supervisor_step(schedule, 0.0, True, order) == ((w.GOES, -1) if starts else (w.WAITS, 1))
+        assert order[2, w.EPOCH] == starts
+        words[2, w.EPOCH], words[2, w.PHASE], words[2, w.TIME] = 1.0, phase, 1.0
+        w.robot_step(schedule, 0.0, w.QUIET, 1, w.first_motion(phase), words)
+        assert words[1, w.KIND] == (w.ARMED if starts else w.REST)
+
+
+def test_who_has_not_heard_a_start_that_others_have_given_up_leaves_its_epoch_with_them():
+    """Else no supervisor that was started again could ever start them."""
+    team = Team(even_schedule(4), [0.0] * 3)
+    team.closed = {(3, 1), (3, 2)}
+    team.until(lambda team: team.words[-1, -1, w.EPOCH] == 1.0)
+    team.step()
+    team.gone = {3}
+    team.until(lambda team: team.words[0, 0, w.EPOCH] == 1.0 and team.kinds[0] == w.REST)
+    team.words[-1] = w.first_words(team.schedule, 3, again=True)
+    team.gone = team.closed = set()
+    team.until(arrived)
+
+
+@pytest.mark.parametrize("late", [0.02, 0.2])
+def test_a_hold_that_is_heard_too_late_is_kept_from_the_last_sample_on(late):
+    team = Team(even_schedule(6), [0.0])
+    team.until(lambda team: team.time > 1.5)
+    before = team.now[0]
+    team.words[0, 0, w.HOLD] = before[0] - late
+    phase, pace, rate = team.step()[0]
+    step = team.schedule.period
+    assert before[0] < phase <= before[0] + step
+    assert abs(pace - before[1]) <= 10.0 * step**2  # rho'' = kappa / r < 20
+    assert rate < 0.0
+    assert team.kinds == [w.BRAKE]
 
 
 def test_who_does_not_hear_that_a_start_is_called_off_stops_at_once():

@@ -149,5 +149,7 @@ def _transition(
 def with_motion(plan: Plan) -> Plan:
     """The plan with a motion by hand that waits at its start: for tests of blocks, which no cell judges."""
     still, cells = np.tile(plan.start, (7, 1)), len(plan.cells)
-    windows = np.stack([np.linspace(0.0, 3.0, cells), np.linspace(1.0, 4.0, cells)], axis=1)
-    return replace(plan, motion=Motion(still, 1.0, windows, np.zeros(cells), 0.1, 0.1, 100.0, 20.0))
+    begins = np.linspace(0.0, 3.0, cells)
+    windows = np.stack([begins, np.append(begins[1:] + 0.5, 4.0)], axis=1)
+    pulls = ((100.0, 20.0), (100.0, 20.0))
+    return replace(plan, motion=Motion(still, 1.0, windows, np.zeros(cells), 0.128, 0.1, 1.0, pulls))

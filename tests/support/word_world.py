@@ -147,7 +147,7 @@ def run(
             cut = suffers(faults, CUT, node, t)
             deaf, mute = cut or suffers(faults, DEAF, node, t), cut or suffers(faults, MUTE, node, t)
             for sender in range(nodes):
-                oldest = int(floor((t - delay) / period - offsets[sender] + 1e-6)) % slots
+                oldest = floor((t - delay) / period - offsets[sender] + 1e-6) % slots
                 passes = not deaf and not suffers(faults, CUT, sender, t)
                 for slot in range(slots):
                     if taken[sender, node, slot] == 0.0 and (due[sender, node, slot] <= t or slot == oldest):
@@ -176,9 +176,7 @@ def run(
                 rough = rough or not -hardest - 1e-9 <= now[node, 2]
                 rough = rough or not now[node, 2] <= schedule.start_rate * (1.0 - now[node, 1] ** 2) + 1e-9
                 jumps = motions[node, w.FIRST] == 0.0 and before[node, 1] == 0.0  # a start at phase 0
-                rough = rough or (
-                    not jumps and abs(now[node, 1] - before[node, 1]) > hardest * 1.001 * step
-                )
+                rough = rough or (not jumps and abs(now[node, 1] - before[node, 1]) > hardest * 1.001 * step)
                 if rough and own[w.HOLD] > -inf and m > 0:
                     # At the end the motion itself is at rest, whatever the pace.
                     found[ROUGH] += 1.0 if now[node, 0] < schedule.ends[-1] else 0.0

@@ -15,6 +15,7 @@ from pydrake.systems.primitives import FirstOrderLowPassFilter, ZeroOrderHold
 from benchmarks.one_process import DirectExchange
 from coop_drake import systems
 from coop_drake.diagram import build_closed_loop, build_world
+from coop_drake.diagram.robot_controller import team_schedule
 from coop_drake.laws import acceleration_at, wrench_share
 from coop_drake.laws.departures import CREEP_SPEED, act_on_wrenches, without_departures
 from coop_drake.plant import (
@@ -94,9 +95,12 @@ def blocks():
         for leaf in leaves(loop.diagram):
             found.setdefault(type(leaf).__name__, (leaf, loop))
     scenario, plan = own
-    loop = build_closed_loop(scenario, with_motion(plan), small_maps())
+    sampled = replace(scenario, deployment=Deployment(control_rate=200.0))
+    loop = build_closed_loop(sampled, with_motion(plan), small_maps())
     for leaf in leaves(loop.diagram):
         found.setdefault(type(leaf).__name__, (leaf, loop))
+    known = team_schedule(sampled, with_motion(plan)), systems.Radio(0, 2)
+    found["RobotWords"] = systems.RobotWords(*known, alarmed=True, ahead=0.01), loop
     world = build_world(replace(scenario, deployment=EVERYTHING), plan, DirectExchange())
     found["TeamLink"] = world.link, world
     return found
@@ -159,6 +163,8 @@ def test_only_switches_jumps_holds_what_is_predicted_and_what_models_failures_ar
         "StatePredictor",
         "NominalAxes",
         "NominalGovernor",
+        "RobotWords",
+        "WordPlanner",
     }
     assert remembering == laws | holds | failures | {"TeamLink", "DepartureMonitor"}
 

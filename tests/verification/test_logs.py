@@ -42,7 +42,7 @@ def case():
 
 
 def arrays(log):
-    return [f.name for f in fields(log) if isinstance(getattr(log, f.name), np.ndarray)]
+    return [f.name for f in fields(log) if np.size(getattr(log, f.name)) and f.metadata["kind"] == "fi"]
 
 
 def altered(log, name, generator):

@@ -54,8 +54,8 @@ def check_followed(rows: Rows, problem: PlanningProblem, *, exact: bool) -> list
 def check_phases(rows: Rows, motion: Motion, *, exact: bool) -> Check:
     """Check that the phases of all robots are such as their words allow, and agree but for their clocks.
 
-    With the pace rho, 0 <= rho <= 1, sigma' = rho and -kappa <= rho' <= alpha (1 - rho^2), kappa being that of
-    the stops that may end after sigma; a robot that creeps to another one keeps |rho'| <= alpha (1 - rho^2).
+    With the pace rho, 0 <= rho <= 1, sigma' = rho and -kappa <= rho' <= alpha (1 - rho^2), kappa being that
+    of the stops that may end after sigma; one that creeps to another one keeps |rho'| <= alpha (1 - rho^2).
     At phase 0 and at the end, where the motion is at rest, the pace may jump.
 
     Raises:
@@ -63,7 +63,9 @@ def check_phases(rows: Rows, motion: Motion, *, exact: bool) -> Check:
     """
     log, count = rows.log, len(rows.log.robot_names)
     if log.phases.shape != (len(log.times), count, 3):
-        raise RefusalError("phases", f"has the shape {log.phases.shape}; the plan's motion needs a phase a robot")
+        raise RefusalError(
+            "phases", f"has the shape {log.phases.shape}; the plan's motion needs a phase a robot"
+        )
     phase, pace, rate = np.moveaxis(log.phases, 2, 0)
     rows.require_same("phases", np.zeros((1, count, 3)), 0.0)
     last = log.phases[-1]
@@ -84,7 +86,9 @@ def check_phases(rows: Rows, motion: Motion, *, exact: bool) -> Check:
     off = np.where(jumps, np.maximum(went - h, -went), np.abs(went - 0.5 * h * (pace[1:] + pace[:-1])))
     allowed = np.where(jumps, 0.0, 0.25 * h * h * hardest) + SAME
     text = "went on by {:.9g} s, which its paces do not allow"
-    rows.require((off <= allowed) & (jumps | (np.abs(paced) <= h * hardest + SAME)), "phases", text, went, first=1)
+    rows.require(
+        (off <= allowed) & (jumps | (np.abs(paced) <= h * hardest + SAME)), "phases", text, went, first=1
+    )
     parted = np.ptp(phase, axis=1)
     text = "of robots differ by {:.9g} s"
     rows.require(parted <= (0.0 if exact else 2.0 * CLOCK_ERROR) + SAME, "phases", text, parted)
@@ -93,7 +97,7 @@ def check_phases(rows: Rows, motion: Motion, *, exact: bool) -> Check:
 
 
 def _check_cells(rows: Rows, motion: Motion, *, exact: bool) -> Check:
-    """Check cells and their times by the phases, the stated funnels, and that the team rests where it is held."""
+    """Check cells and their times by the phases, the stated funnels, and that a held team rests."""
     log, plan = rows.log, rows.plan
     least, most = log.phases[..., PHASE].min(axis=1), log.phases[..., PHASE].max(axis=1)
     bounds = np.array([[cell.lower, cell.upper] for cell in plan.cells])
@@ -112,15 +116,17 @@ def _check_cells(rows: Rows, motion: Motion, *, exact: bool) -> Check:
     since, left = least[entered] - windows[1:, 0], windows[:-1, 1] - most[entered]
     longest = WORD_PERIOD if exact else np.inf
     for k in np.flatnonzero((since < -SAME) | (left < -SAME) | (since > longest + SAME)):
-        text = f"is entered at the phases {least[entered[k]]:.9g} s to {most[entered[k]]:.9g} s; the motion is in "
-        text += f"both cells from {windows[k + 1, 0]:.9g} s to {windows[k, 1]:.9g} s"
+        text = f"is entered at the phases {least[entered[k]]:.9g} s to {most[entered[k]]:.9g} s; the motion "
+        text += f"is in both cells from {windows[k + 1, 0]:.9g} s to {windows[k, 1]:.9g} s"
         raise RefusalError(f"cell_index[{entered[k]}]", f"cell {k + 1} {text}")
     rows.require_same("clock_lag", np.zeros(len(log.times)), 0.0)
     rests = (log.held == 0.0) | ((log.held == 1.0) & (log.phases[..., PACE] == 0.0).all(axis=1))
     rows.require(rests, "held", "is {}; it is 1 only where all rest", log.held)
     arrays = ("cell_index", "transition_start", "funnel_lower", "funnel_upper", "clock_lag")
     name = "cells were entered while the motion lay in both, and are the stated funnels"
-    return Check(name, len(entered), float(left.min(initial=np.inf)), "s, least time left in the earlier", arrays)
+    return Check(
+        name, len(entered), float(left.min(initial=np.inf)), "s, least time left in the earlier", arrays
+    )
 
 
 def _at(motion: Motion, phases: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:

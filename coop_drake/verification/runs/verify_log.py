@@ -20,7 +20,7 @@ that no check computes again, or ties to others, are named in the answer.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import fields, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -178,7 +178,7 @@ def verify_log(
 def _taken_as_logged(log: SimulationLog, checks: Sequence[Check]) -> list[str]:
     """Name the arrays of which numbers can be altered without being refused; nothing where there is none."""
     tied = {name for check in checks for name in check.arrays}
-    arrays = [field.name for field in fields(log) if isinstance(getattr(log, field.name), np.ndarray)]
+    arrays = [name for name, array in vars(log).items() if isinstance(array, np.ndarray) and array.size]
     free = [name for name in arrays if name not in tied]
     return [f"these arrays, which are read as they are logged: {', '.join(free)}"] if free else []
 
