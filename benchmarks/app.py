@@ -40,6 +40,7 @@ from benchmarks.simulating import simulating_tasks
 from benchmarks.study import Study, batches_of, load_study, make_study, show_results
 from benchmarks.table import TOPICS, WHOLE, show, show_contents
 from benchmarks.tasks import Task, chosen, worked
+from benchmarks.words import word_tasks
 from coop_drake.campaign.records import CampaignFolder
 from coop_drake.cli.reporter import ExitCode, reporting
 from coop_drake.errors import ScenarioError
@@ -187,6 +188,7 @@ def _tasks(effort: Effort) -> list[Task]:
         *compiled_tasks(),
         *adversary_tasks(),
         *message_tasks(),
+        *word_tasks(),
         *apart_tasks(),
         *rejoining_tasks(),
         *limp_tasks(),

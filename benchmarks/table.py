@@ -85,6 +85,7 @@ TOPICS = {
     "compiled": "runs of the compiled loop beside those of Drake's: how many a second, and their differences",
     "breaking": "departures that an axis bears, by a search for the worst, beside those that are certified",
     "alarms": "levels of monitors: 400 certified runs of each shipped transport; the chance of false alarms",
+    "words": "teams that pass, with a robot deaf or mute: how far they part; cost of their runs",
     "apart": "processes of their own: cost of messages and of 2, 4 and 8 robots; kills; limp robots; stops",
     "adversaries": "altered plans and proofs beside the exact checker; how long it checks random answers",
 }

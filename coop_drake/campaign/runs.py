@@ -68,9 +68,18 @@ def record_of_log(run: Run, scenario: str, log: SimulationLog, plan: Plan, diges
         budget_share=share,
         peak_force=CRITERIA["peak_force"].measure(log),
         peak_torque=CRITERIA["peak_torque"].measure(log) if log.joint_names else nan,
-        held=int((np.diff(log.held, prepend=0.0) > 0.0).sum()),
+        held=_times_held(log, plan),
         digest=digest,
     )
+
+
+def _times_held(log: SimulationLog, plan: Plan) -> int:
+    """Return how often a team was held, or came to rest on its way where it passes from cell to cell."""
+    if plan.motion is None:
+        return int((np.diff(log.held, prepend=0.0) > 0.0).sum())
+    moves = np.asarray(log.phases[:, :, 1].max(axis=1) > 0.0)
+    stops = moves[:-1] & ~moves[1:]
+    return int((stops & (log.phases[1:, :, 0].min(axis=1) < plan.motion.duration)).sum())
 
 
 class RunMaker:

@@ -14,6 +14,7 @@ import numpy as np
 from coop_drake.laws.departures import WorldDepartures
 from coop_drake.laws.robot_dynamics import MOTION_COLUMNS
 from coop_drake.laws.team_dynamics import StickingRoom, TeamWork, sticking_room, team_work
+from coop_drake.laws.words import Schedule
 from coop_drake.systems.kernels import NOMINAL_SIZE
 from coop_drake.tree.arrays import FloatArray, IntArray
 from coop_drake.tree.component_tree import TeamArrays
@@ -31,8 +32,8 @@ class LoopCells(NamedTuple):
         fields: What the velocity fields add to them.
         tables: The axes of all robots, shape (C, M, ``LAW_COLUMNS``).
         slices: Lower, then upper ends of the slices of (theta, q), shape (2, C, 1 + n) [rad or m].
-        numbers: Inradius R [m], K with which the cell is entered [1/s^2], longest time in it [s] and the
-            target [m], shape (C, 5).
+        numbers: Inradius R [m], K with which the cell is entered [1/s^2], longest time in it, of a team that
+            passes longest time at rest [s], and the target [m], shape (C, 5).
         goal: Goal position, shape (2,) [m].
         tolerance: Largest distance of the nominal position to it that counts as arrived [m].
         places: Of every robot the ``place`` of its ``ArrivalGoal``, one after the other, shape (3 N + n,).
@@ -101,9 +102,14 @@ class LoopPlant(NamedTuple):
 
 
 class LoopNominal(NamedTuple):
-    """The nominal motions of a plan with a budget; arrays of shape (0,) where it has none for the axes.
+    """The nominal motion of a team that passes, and those of a plan with a budget, (0,) where there are none.
 
     Attributes:
+        schedule: When cells are begun and left; of no cells where the team rests in every cell.
+        points: Control points of the motion, see ``motion_at``, shape (m, 3 + n), or (0, 0).
+        span: Time of a span of it [s].
+        gains: K_t [1/s^2] and zeta_t [1/s] of the position, then of the axes, shape (4,).
+        ahead: How long after a sample its efforts act on average, T / 2 and the lag that robots know [s].
         flow: What ``nominal_flow`` gives, of shape (0, 0) where p_G follows the measured position.
         position: Largest speed of p_G [m/s], for how many periods a report is used [-], the radius of the
             tube [m], and the largest departure of the velocity [m/s], shape (4,).
@@ -119,6 +125,11 @@ class LoopNominal(NamedTuple):
             (0, 0, 0) [rad or m, and per s].
     """
 
+    schedule: Schedule
+    points: FloatArray
+    span: float
+    gains: FloatArray
+    ahead: float
     flow: FloatArray
     position: FloatArray
     axis_gains: FloatArray
@@ -144,8 +155,12 @@ class LoopDepartures(NamedTuple):
         odometry: Factors of the measured rates of bases, shape (N,) [-].
         shifts: How much earlier robots measure than they take it for, in periods, shape (N,) [-].
         limits: Largest efforts, of every robot those of ``limit_efforts``, shape (2 N + n,) [N, N m].
-        hearing: Errors of the clocks [s], and how late switches are heard [periods], shape (2, N).
-        silences: Begin and end [s], and 0 for motors that work, 1 for held ones, 2 for limp ones, (3, N).
+        hearing: Errors of all clocks [s], how late switches are heard, and words beside the period that all
+            need [periods], shape (3, N + 1), the supervisor's last.
+        silences: Begin and end [s], and 0 for motors that work, 1 for held ones, 2 for limp ones; then begin
+            and end of deafness [s], shape (5, N + 1).
+        links: Seeds of the losses of words, of every listener and sender, shape (N + 1, N + 1).
+        pauses: Begins and ends of the holds that the scenario orders [s], shape (., 2).
         world: What the world does to the team.
     """
 
@@ -160,6 +175,8 @@ class LoopDepartures(NamedTuple):
     limits: FloatArray
     hearing: FloatArray
     silences: FloatArray
+    links: IntArray
+    pauses: FloatArray
     world: WorldDepartures
 
 
@@ -185,7 +202,14 @@ class LoopMemory(NamedTuple):
         channels: What the channels of reports hold, shape (N, ``channel_rows``, 2).
         reports: What robots report, and what they said last before a silence, shape (2, N, 2).
         alarms: What their monitors say, as the block ``DepartureMonitor`` shows it, and when something was
-            above its level the last time, shape (N, 4).
+            above its level the last time; then what of it the state machine of words is told, shape (N, 5).
+        words: What robots and supervisor have heard of each other and say, shape (N + 1, N + 1,
+            ``WORD_SIZE``); this and the next four of a team that passes, else of shape (0, ...).
+        said: What they said, ring (R, N + 1, ``WORD_SIZE``).
+        motions: Of all robots, see ``phase_at``, shape (N, ``MOTION_SIZE``).
+        phases: Their phases [s] and paces [-] at the last samples, ring (D, N, 2).
+        supervised: What the supervisor sees, see ``supervisor_step``, how often the team came to rest on its
+            way, and whether it moves along it, shape (4,).
     """
 
     state: FloatArray
@@ -204,6 +228,11 @@ class LoopMemory(NamedTuple):
     channels: FloatArray
     reports: FloatArray
     alarms: FloatArray
+    words: FloatArray
+    said: FloatArray
+    motions: FloatArray
+    phases: FloatArray
+    supervised: FloatArray
 
 
 # Room for what is computed on the way: what compiled functions allocate is counted wherever it is passed on.
@@ -234,6 +263,12 @@ class RobotRoom(NamedTuple):
         arrivals: What a channel of reports holds next, of its shape.
         motion: Motion of the longest chain, see ``motion_room``.
         shown: What ``show_nominal`` writes, shape (6,).
+        then: The motion of a team that passes when what the robot knows was measured, shape (3, 3 + n).
+        ahead: That when efforts act, of the same shape.
+        columns: Where (x, y, theta, q) stand in it, shape (3 + n,).
+        wanted: Desired accelerations of the object and of the robot's joints there, shape (3 + n,).
+        led: (x, y) then and their rates, shape (4,); with the next one for the robot's monitor.
+        led_axes: (theta, q_k) then and their rates, or when efforts act, shape (2, M).
     """
 
     pose: FloatArray
@@ -251,6 +286,12 @@ class RobotRoom(NamedTuple):
     arrivals: FloatArray
     motion: FloatArray
     shown: FloatArray
+    then: FloatArray
+    ahead: FloatArray
+    columns: IntArray
+    wanted: FloatArray
+    led: FloatArray
+    led_axes: FloatArray
 
 
 def robot_room(team: LoopTeam, memory: LoopMemory) -> RobotRoom:
@@ -261,6 +302,8 @@ def robot_room(team: LoopTeam, memory: LoopMemory) -> RobotRoom:
         np.empty(M), np.empty(M), np.empty((3, M)), np.empty(M),
         np.empty(memory.efforts.shape[1]), np.empty(state), np.empty((line[0] + 1, line[1])),
         np.empty(memory.channels.shape[1:]), _longest_motion(team), np.empty(NOMINAL_SIZE),
+        np.empty((3, state // 2)), np.empty((3, state // 2)), np.arange(state // 2), np.empty(state // 2),
+        np.empty(4), np.empty((2, M)),
     )  # fmt: skip
 
 
@@ -326,6 +369,7 @@ class WatchRoom(NamedTuple):
         poses: Room for the poses of all components, see ``place_into``.
         vertices: Room for the vertices in W, shape (V, 2) [m].
         discs: Room for the discs in W, shape (P, 3) [m].
+        nominal: Where every robot's motion is, see ``motion_at``, shape (N, 3, 3 + n).
     """
 
     z: FloatArray
@@ -338,6 +382,7 @@ class WatchRoom(NamedTuple):
     poses: FloatArray
     vertices: FloatArray
     discs: FloatArray
+    nominal: FloatArray
 
 
 def watch_room(plant: LoopPlant) -> WatchRoom:
@@ -346,5 +391,5 @@ def watch_room(plant: LoopPlant) -> WatchRoom:
     return WatchRoom(
         np.empty(n), np.full(n, np.nan), np.full(4, np.nan), np.full(2 * plant.bases.size - 1, np.nan),
         np.zeros(2), np.full((len(shapes.pieces), 2), np.nan), np.full((len(shapes.pairs), 2), np.nan),
-        *shapes.room(),
+        *shapes.room(), np.empty((plant.bases.size - 1, 3, n)),
     )  # fmt: skip

@@ -13,9 +13,10 @@ from coop_drake.compiled_loop.arrays import (
     RobotRoom,
     WatchRoom,
 )
-from coop_drake.compiled_loop.robots import compute
+from coop_drake.compiled_loop.robots import EARLY, compute, talk
 from coop_drake.compiled_loop.watching import ENDED, RUNS, left_by_all, watch
 from coop_drake.jit import compiled
+from coop_drake.laws import words
 from coop_drake.laws.actuators import lag_behind, limit_efforts
 from coop_drake.laws.departures import act_on_wrenches
 from coop_drake.laws.measurements import carry_reports, uniform_pair
@@ -24,9 +25,6 @@ from coop_drake.laws.robot_dynamics import read_robot
 from coop_drake.laws.team_dynamics import stick
 from coop_drake.systems.kernels import step_nominal
 from coop_drake.tree.arrays import FloatArray
-
-EARLY = 1e-6
-"""Share of a period by which an interval that begins at a sample may seem to begin later [-], by rounding."""
 
 
 @compiled(borrows=True)
@@ -63,11 +61,16 @@ def update(
     cells: LoopCells, team: LoopTeam, nominal: LoopNominal, departures: LoopDepartures, room: RobotRoom,
     memory: LoopMemory, sample: int,
 ) -> None:  # fmt: skip
-    """Do all that is done at a sample, and carry what is between the robots over a period."""
+    """Do all that is done at a sample, and carry what is between the robots over a period.
+
+    A team that passes has no cell planner and no reports.
+    """
     period, channels = departures.times[0], memory.channels
     instant, early = sample * period, EARLY * period
     for i in range(room.held.size):
         room.held[i] = memory.efforts[0, i]
+    if nominal.points.size:
+        talk(sample, instant, nominal, departures, memory)
     compute(sample, sample, sample * period, False, cells, team, nominal, departures, room, memory)
 
     # Robots that fall silent, with motors that fail; limits of actuators.
@@ -83,6 +86,14 @@ def update(
             for i in range(own.size):
                 own[i] = room.held[3 * k + first + i] if motors == 1.0 else 0.0
         limit_efforts(departures.limits[2 * k + first : 2 * k + 2 + last], own)
+    if nominal.points.size:  # What is said now; of who is silent, what was said before.
+        ring = memory.said.shape[0]
+        for k in range(team.yaws.size + 1):
+            silent = departures.silences[0, k] - early <= instant < departures.silences[1, k] - early
+            for i in range(words.WORD_SIZE):
+                before = memory.said[(sample - 1) % ring, k, i]
+                memory.said[sample % ring, k, i] = before if silent else memory.words[k, k, i]
+        return
 
     # The nominal motions and the cell planner, which all read what was before, as in Drake.
     entered = memory.current[sample % memory.current.shape[0]]

@@ -21,6 +21,7 @@ from coop_drake.errors import ScenarioError
 from coop_drake.geometry.polygons import BoundaryDistance
 from coop_drake.harmonic_maps import HarmonicMap, VelocityField
 from coop_drake.laws.ppc import governed_gains
+from coop_drake.laws.words import Schedule
 from coop_drake.plant import (
     TeamPlant,
     base_chain,
@@ -31,11 +32,16 @@ from coop_drake.plant import (
 )
 from coop_drake.scenario import Scenario
 from coop_drake.simulation.clearance import TeamClearance
-from coop_drake.simulation.run import patience
+from coop_drake.simulation.run import PATIENCE_ALLOWANCE, patience
 from coop_drake.systems import axis_laws
 from coop_drake.systems.kernels import NOTHING
 from coop_drake.tree.arrays import FloatArray, IntArray
 from coop_drake.tree.component_tree import ComponentTree, axis_levers
+
+_NO_CELLS = np.empty(0)
+
+NO_SCHEDULE = Schedule(0.0, _NO_CELLS, _NO_CELLS, _NO_CELLS, _NO_CELLS, 0.0, 0.0, 0.0, 0.0, 0.0)
+"""That of a team that rests in every cell."""
 
 
 @dataclass(frozen=True)
@@ -81,8 +87,6 @@ def prepare(scenario: Scenario, plan: Plan, maps: Sequence[HarmonicMap]) -> Comp
             wants.
     """
     _check(scenario)
-    if plan.motion is not None:
-        raise _refusal(scenario, "planner.hand_over", "pass", "rest")
     exact = replace(scenario, deployment=replace(scenario.deployment, mass_error=0.0))
     team = build_team_plant(scenario, DiagramBuilder())
     knowledge = robot_knowledge(exact, plan, maps, team)
@@ -118,12 +122,12 @@ def _axes(joints: Sequence[slice]) -> IntArray:
 
 def _check(scenario: Scenario) -> None:
     """Refuse what does not change from run to run and the loop does not know."""
-    control = scenario.control
+    control, passes = scenario.control, scenario.planner.hand_over == "pass"
     for key, found, allowed in (
         ("plant.grasps", scenario.plant.grasps if not scenario.plant.ideal else None, "joints"),
         ("control.predictor", control.predictor or None, "false"),
         ("control.observer", control.observer or None, "false"),
-        ("control.hold", control.hold, "null"),
+        ("control.hold", None if passes else control.hold, "null"),
     ):
         if found is not None:
             raise _refusal(scenario, key, found, allowed)
@@ -150,8 +154,11 @@ def _cells(scenario: Scenario, plan: Plan, maps: Sequence[HarmonicMap], joints: 
             stack.append(entry)
     first = [np.cumsum([0, *(len(entry) for entry in stack)]) for stack in stacks]
     governed, regions, flats, fields = (np.ascontiguousarray(np.concatenate(stack)) for stack in stacks)
+    longest = [
+        patience(plan, i) if plan.motion is None else PATIENCE_ALLOWANCE for i in range(len(plan.cells))
+    ]
     numbers = [
-        [each.inradius, governed_gains(cell.row, 0.0)[0], patience(plan, i), *each.target]
+        [each.inradius, governed_gains(cell.row, 0.0)[0], longest[i], *each.target]
         for i, (each, cell) in enumerate(zip(plan.transitions, cells, strict=True))
     ]
     return LoopCells(
@@ -229,7 +236,13 @@ def _nominal(plan: Plan, team: TeamPlant, knowledge: Sequence[RobotKnowledge]) -
     gains = none
     if motion is not None:
         gains = np.array([motion.tracking.stiffness, motion.tracking.damping, motion.lag])
+    plain = plan.motion
     return LoopNominal(
+        NO_SCHEDULE,
+        np.empty((0, 0)) if plain is None else np.ascontiguousarray(plain.points),
+        0.0 if plain is None else plain.period,
+        np.zeros(4) if plain is None else np.ravel(plain.gains),
+        0.0,
         np.empty((0, 0)),
         none if tube is None else np.array([tube.speed, 0.0, tube.radius, tube.rate]),
         gains,

@@ -20,11 +20,13 @@ from coop_drake.compiled_loop.arrays import (
     RobotRoom,
 )
 from coop_drake.jit import compiled
+from coop_drake.laws import words
 from coop_drake.laws.axis_table import track_axes, write_jumps
 from coop_drake.laws.measurements import NOTHING, carry_measurements, uniform_pair, write_errors
-from coop_drake.laws.motion import place_on_axes
+from coop_drake.laws.motion import motion_at, place_on_axes, pull
 from coop_drake.laws.nominal import carry_axes, pull_axes, track_nominal
 from coop_drake.laws.readiness import (
+    BRAKES,
     FAR,
     QUIET,
     alarm_at,
@@ -41,13 +43,73 @@ from coop_drake.systems.kernels import (
     robot_arrived,
     show_nominal,
 )
-from coop_drake.tree.arrays import FloatArray
+from coop_drake.tree.arrays import FloatArray, IntArray
 
 LOST_POSE, POSE_NOISE = 1, 5
 """Uses of seeds: losses and noise of measured poses; those of measured states are the next ones."""
 
+EARLY = 1e-6
+"""Share of a period by which an interval that begins at a sample may seem to begin later [-], by rounding."""
+
+ALARM, SAID = 0, 4
+"""Where the alarm stands of a robot's monitor, and what of it the state machine of words is told."""
+
 ON_TIME = np.array([0.0, 1.0, 0.0])
 """A clock that never stood still: lag [s], pace [-] and the derivative of the pace [1/s]."""
+
+
+@compiled(inlined=True, borrows=True)
+def talk(
+    sample: int, now: float, nominal: LoopNominal, departures: LoopDepartures, memory: LoopMemory
+) -> None:  # fmt: skip
+    """Let robots and supervisor of a team that passes hear what was said, and decide.
+
+    Args:
+        sample: Number of the sample.
+        now: Time of the run [s].
+        nominal: The motion.
+        departures: What departs.
+        memory: Receives what everybody has heard, and what robots do.
+    """
+    robots, schedule, loss = memory.motions.shape[0], nominal.schedule, departures.probabilities[2]
+    early, cell = now + EARLY * departures.times[0], schedule.begins.size - 1
+    moves, phase = False, np.inf
+    for node in range(robots + 1):
+        known, age = memory.words[node], 1 + int(departures.hearing[2, node])
+        deaf = departures.silences[3, node] <= early < departures.silences[4, node]
+        said = memory.said[(sample - age) % memory.said.shape[0]]
+        for sender in range(robots + 1):
+            if sender == node or sample < age or deaf:
+                continue
+            if loss > 0.0 and uniform_pair(departures.links[node, sender], sample)[0] < loss:
+                continue
+            words.hear(known, sender, said[sender])
+        if node == robots:
+            wanted = True
+            for i in range(departures.pauses.shape[0]):
+                wanted = wanted and not departures.pauses[i, 0] <= now < departures.pauses[i, 1]
+            seen = words.supervisor_step(schedule, now, wanted, known)
+            memory.supervised[0], memory.supervised[1] = seen[0], seen[1]
+            continue
+        clock, alarm = now + departures.hearing[0, node], int(memory.alarms[node, SAID])
+        phases = memory.phases[sample % memory.phases.shape[0], node]
+        phases[0], phases[1], _ = words.robot_step(schedule, clock, alarm, node, memory.motions[node], known)
+        moves, phase = moves or phases[1] > 0.0, min(phase, phases[0])
+        cell = min(cell, begun(schedule.begins, phases[0]))
+    if not moves and memory.supervised[3] > 0.0 and phase < schedule.ends[-1]:
+        memory.supervised[2] += 1.0
+    memory.supervised[3] = 1.0 if moves else 0.0
+    ring = memory.current.shape[0]
+    entered, following = memory.current[sample % ring], memory.current[(sample + 1) % ring]
+    following[0], following[1] = entered[0], entered[1]
+    if cell != entered[0]:
+        following[0], following[1] = cell, now
+
+
+@compiled(borrows=True)
+def begun(begins: FloatArray, phase: float) -> int:
+    """Return the last cell that is begun at a phase [s] or before."""
+    return max(int(np.searchsorted(begins, phase, side="right")) - 1, 0)
 
 
 @compiled(inlined=True, borrows=True)
@@ -76,6 +138,8 @@ def compute(
     if nominal.flow.size:
         led_then = memory.nominal[seen_at % memory.nominal.shape[0]]
     axes_led, last_cell = nominal.axis_gains.size > 0, cells.rows.shape[0] - 1
+    passes, points, span = nominal.points.size > 0, nominal.points, nominal.span
+    decided = sample - 1 if whole else sample  # The last sample at which a team that passes has decided.
     for k in range(team.yaws.size):
         # Its axes are the rows from ``begin`` to ``end``, its z_k stands at ``own``.
         begin, end, own = k + first[2, k], k + 1 + first[2, k + 1], 3 * k + first[2, k]
@@ -107,14 +171,32 @@ def compute(
             seed = departures.seeds[k, LOST_POSE + 1]
             _pass(sample, number, seed, lossy, room.line, memory.lines[k, 1], robot)
         estimate_object(chain, load[:2], room.motion, robot, pose, seen)
+
+        # Where the motion of a team that passes was when this was measured, and will be when efforts act.
+        cell, time = heard_cell(k, sample, now, departures.hearing, memory.current)
+        if passes:
+            schedule, motion, clock = nominal.schedule, memory.motions[k], now + departures.hearing[0, k]
+            cell = begun(schedule.begins, memory.phases[decided % memory.phases.shape[0], k, 0])
+            stamp = memory.phases[(decided - int(departures.periods[0])) % memory.phases.shape[0], k]
+            motion_at(points, span, stamp[0], stamp[1], 0.0, room.then)
+            phase, pace, rate = words.phase_at(schedule, motion, clock + nominal.ahead)
+            motion_at(points, span, phase, pace, rate, room.ahead)
+            phase, _, _ = words.phase_at(schedule, motion, clock)
         if nominal.levels.size:
-            _monitor(k, sample, now, team, nominal, departures, memory, room, robot)
+            _monitor(k, sample, decided, now, team, nominal, departures, memory, room, robot)
 
         # The desired acceleration of the object's origin, and p_G'.
-        cell, time = heard_cell(k, sample, now, departures.hearing, memory.current)
         edges = cells.governed[cells.first[0, cell] : cells.first[0, cell + 1]]
-        governed, linear, governor = room.governed, room.governed[2:], memory.governors[k]
-        if nominal.flow.size:
+        governed, governor = room.governed, memory.governors[k]
+        wanted = room.wanted[: size // 2]
+        linear = wanted[:2] if passes else governed[2:]
+        if passes:
+            governed[0], governed[1], departing = 0.0, 0.0, room.shown
+            if whole:  # Delta E of the departure from the motion.
+                for i in range(6):
+                    departing[i] = seen[i] - (room.then[1, i - 3] if i in (3, 4) else 0.0)
+                told[ENERGY], _ = cell_margin(edges, nominal.gains[0], departing, room.then[0])
+        elif nominal.flow.size:
             governed[0], governed[1], governor = 0.0, 0.0, led[4:6]
             track_nominal(team.tracking, seen, governor, led, led_then, linear)
         else:
@@ -127,7 +209,18 @@ def compute(
         for i in range(begin, end):
             room.fading[i] = memory.jumps[i] if memory.jumped[k] == cell else 0.0
         acts = 0
-        if axes_led:  # The law acts on the nominal axes of now; efforts will act on later ones.
+        if passes:
+            acts, columns = 2, room.columns[3 + first[2, k] : 3 + first[2, k + 1]]
+            pull(room.ahead, room.then, columns, nominal.gains, seen, robot, wanted)
+            for i in range(6):
+                room.seen[2, i] = seen[i]
+            for i in range(size):
+                room.robots[2, i] = robot[i]
+            axes = room.led_axes[:, begin:end]
+            _take_axes(room.ahead, columns, axes)
+            room.seen[2, 2], room.seen[2, 5] = axes[0, 0], axes[1, 0]
+            place_on_axes(axes, nominal.mountings[begin:end], room.robots[2, :size])
+        elif axes_led:  # The law acts on the nominal axes of now; efforts will act on later ones.
             acts, gains, mounting = 2, nominal.axis_gains, nominal.mountings[begin:end]
             axes = memory.axes[sample % memory.axes.shape[0], :, begin:end]
             then = memory.axes[seen_at % memory.axes.shape[0], :2, begin:end]
@@ -146,25 +239,32 @@ def compute(
             place_on_axes(later, mounting, room.robots[2, :size])
         else:
             track_axes(table, time, ON_TIME, jumps, seen, robot, law)
-        asked = room.pulled[begin:end] if axes_led else law
+        asked = law
+        if acts > 0:
+            asked = wanted[2:] if passes else room.pulled[begin:end]
         told[ACCELERATION], told[ACCELERATION + 1], told[ACCELERATION + 2] = linear[0], linear[1], asked[0]
         end_effector_command(load, room.seen[acts], linear, asked, told[COMMAND:])
         effort = memory.efforts[0, own : own + size // 2]
         robot_effort(chain, room.motion, room.robots[acts, :size], told[COMMAND:], asked, effort)
 
         # The report, by the states on which the law acts.
-        judged, judged_robot = room.seen[acts // 2], room.robots[acts // 2, :size]
+        judged, judged_robot, margin = room.seen[acts // 2], room.robots[acts // 2, :size], FAR
         if cell == last_cell:
             rows, places = memory.recent.shape[0], cells.places[own : own + size // 2]
             tolerances, errors = cells.rooms[:, k + begin : k + end + 1]
             recent = memory.recent[:, own : own + size // 2]
             margin = arrival_margin(places, tolerances, errors, recent, (sample - 1) % rows)
             shown = led[: 4 if nominal.flow.size else 0]
-            margin = robot_arrived(
-                table, cells.goal, cells.tolerance, axes_led, judged, judged_robot, shown, margin
-            )
+            if not passes:
+                margin = robot_arrived(
+                    table, cells.goal, cells.tolerance, axes_led, judged, judged_robot, shown, margin
+                )
+            elif phase < schedule.ends[-1]:
+                margin = min(margin, phase - schedule.ends[-1])
             for i in range(size // 2):
                 recent[sample % rows, i] = pose[i] if i < 3 else robot[i]
+        elif passes:
+            margin = phase - schedule.begins[cell + 1]
         else:
             margin = axes_ready(table, cells.tables[cell + 1, begin:end], False, time, judged, judged_robot)
             if whole or not margin < 0.0:
@@ -179,15 +279,28 @@ def compute(
                     energy, _ = cell_margin(following, stiffness, judged, governor)
                     at_position = clearance_margin(energy, stiffness, cells.numbers[cell, 0])
                 margin = min(at_position, margin)
-        if nominal.levels.size and memory.alarms[k, 0] != QUIET:
-            margin = min(margin, FAR)
+        alarm, said = memory.alarms[k, ALARM], words.QUIET
+        if alarm != QUIET:
+            margin, said = min(margin, FAR), words.BRAKES if alarm == BRAKES else words.ASKS
+        elif passes and cell == last_cell and margin >= 0.0:
+            said = words.THERE
+        memory.alarms[k, SAID] = said
         memory.reports[0, k, 0], memory.reports[0, k, 1] = cell, margin
-        if margin >= 0.0 and cell < last_cell:  # The next cell may begin now.
+        if margin >= 0.0 and cell < last_cell and not passes:  # The next cell may begin now.
             after, own_jumps = cells.tables[cell + 1, begin:end], memory.jumps[begin:end]
             write_jumps(table, after, time, ON_TIME, judged, judged_robot, own_jumps)
             memory.jumped[k] = cell + 1
         memory.governors[k, 0] += period * governed[0]
         memory.governors[k, 1] += period * governed[1]
+
+
+@compiled(borrows=True)
+def _take_axes(motion: FloatArray, columns: IntArray, axes: FloatArray) -> None:
+    """Take the axes (theta, q_k) of a robot and their rates out of what ``motion_at`` writes."""
+    for row in range(2):
+        axes[row, 0] = motion[row, 2]
+        for i in range(columns.size):
+            axes[row, 1 + i] = motion[row, columns[i]]
 
 
 @compiled(borrows=True)
@@ -285,14 +398,15 @@ def heard_cell(
 
 @compiled(inlined=True, borrows=True)
 def _monitor(
-    k: int, sample: int, now: float, team: LoopTeam, nominal: LoopNominal, departures: LoopDepartures,
-    memory: LoopMemory, room: RobotRoom, robot: FloatArray,
+    k: int, sample: int, decided: int, now: float, team: LoopTeam, nominal: LoopNominal,
+    departures: LoopDepartures, memory: LoopMemory, room: RobotRoom, robot: FloatArray,
 ) -> None:  # fmt: skip
     """Write what the monitor of robot k says, by what it has measured.
 
     Args:
         k: The robot.
         sample: Number of the sample, or of the next one between two samples.
+        decided: Number of the last sample at which a team that passes has decided.
         now: Time of the run [s].
         team: The robots' models.
         nominal: The nominal motions.
@@ -307,8 +421,16 @@ def _monitor(
     axes = memory.axes[made % memory.axes.shape[0], :2, begin : begin + own]
     then = made * departures.times[0] if age else now
     cell, time = heard_cell(k, made, then, departures.hearing, memory.current)
-    levels = nominal.axis_alarms[cell, :, :, begin : begin + own]
     led, alarms = memory.nominal[made % memory.nominal.shape[0]], memory.alarms[k]
+    if nominal.points.size:
+        begins, led, axes = nominal.schedule.begins, room.led, room.led_axes[:, begin : begin + own]
+        time = memory.phases[(decided - age) % memory.phases.shape[0], k, 0]
+        cell = begun(begins, time)
+        time -= begins[cell]
+        led[0], led[1], led[2], led[3] = room.then[0, 0], room.then[0, 1], room.then[1, 0], room.then[1, 1]
+        if own > 0:
+            _take_axes(room.then, room.columns[3 + team.first[2, k] : 3 + team.first[2, k + 1]], axes)
+    levels = nominal.axis_alarms[cell, :, :, begin : begin + own]
     hand = room.motion[team.first[0, k + 1] - team.first[0, k] - 1]
     mounting = nominal.mountings[begin : begin + size]
     share, which = largest_departure(

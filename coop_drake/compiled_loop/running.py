@@ -11,7 +11,7 @@ import numpy as np
 
 from coop_drake.compiled_loop import arrays, watching
 from coop_drake.compiled_loop.loop import run_loop
-from coop_drake.compiled_loop.preparing import CompiledTransport
+from coop_drake.compiled_loop.preparing import NO_SCHEDULE, CompiledTransport
 from coop_drake.diagram.deployment import (
     clock_shift,
     effort_limits,
@@ -19,19 +19,20 @@ from coop_drake.diagram.deployment import (
     measurement_waves,
     seed_of,
 )
-from coop_drake.diagram.robot_controller import report_periods
+from coop_drake.diagram.robot_controller import report_periods, team_schedule
 from coop_drake.errors import ScenarioError
 from coop_drake.laws.axis_table import first_jumps
 from coop_drake.laws.measurements import NOTHING, channel_rows, whole_periods
 from coop_drake.laws.nominal import nominal_flow
 from coop_drake.laws.readiness import departing_name, mean_samples
 from coop_drake.laws.robot_dynamics import INERTIA, MASS
+from coop_drake.laws.words import WORD_SIZE, first_motion, first_words
 from coop_drake.plant.team import displacement
-from coop_drake.scenario import Deployment
+from coop_drake.scenario import Deafness, Deployment, Silence
 from coop_drake.systems.block import READY_SIZE
 from coop_drake.systems.departures import world_departures
 from coop_drake.systems.monitors import LONG_AGO
-from coop_drake.tree.arrays import FloatArray
+from coop_drake.tree.arrays import FloatArray, IntArray
 
 _USES = 8
 """Number of uses of seeds, see ``seed_of``."""
@@ -57,7 +58,7 @@ def check_deployment(transport: CompiledTransport, deployment: Deployment) -> fl
             allowed = "0: all robots of the compiled loop compute at the same instants"
             raise ScenarioError(where, f"{key}.sample_offset", own.sample_offset, allowed)
         for field in ("switch_delay", "clock_error"):
-            if getattr(own, field) and transport.plan.tube is not None:
+            if getattr(own, field) and transport.plan.motion is None and transport.plan.tube is not None:
                 allowed = (
                     "0 for a plan with a budget: the compiled loop has one nominal motion for all robots"
                 )
@@ -80,8 +81,12 @@ def departures_of(transport: CompiledTransport, deployment: Deployment) -> array
         np.c_[measurement_deviations(deployment, *port), measurement_waves(deployment, *port, period)]
         for port in sizes
     ]
-    hearing = [[own.clock_error for own in robots]]
-    hearing.append([whole_periods(own.switch_delay, period) for own in robots])
+    lateness = [*(own.switch_delay for own in robots), 0.0]
+    hearing = [[*(own.clock_error for own in robots), 0.0]]
+    hearing.append([whole_periods(late, period) for late in lateness])
+    hearing.append([whole_periods(messages.delay + late, period) for late in lateness])
+    hold = transport.scenario.control.hold
+    pauses = [] if hold is None else [(at, at + hold.duration) for at in hold.at]
     return arrays.LoopDepartures(
         times=np.array([period, transport.scenario.simulator.max_time, deployment.actuators.lag]),
         periods=np.array([
@@ -98,19 +103,34 @@ def departures_of(transport: CompiledTransport, deployment: Deployment) -> array
         limits=np.concatenate([effort_limits(deployment, n) for n in joints]),
         hearing=np.array(hearing, dtype=float),
         silences=_silences(deployment, names),
+        links=_links(transport, deployment),
+        pauses=np.array(pauses, dtype=float).reshape(-1, 2),
         world=world_departures(deployment, names),
     )  # fmt: skip
 
 
+def _links(transport: CompiledTransport, deployment: Deployment) -> IntArray:
+    nodes = len(transport.robot_names) + 1
+    links = np.zeros((nodes, nodes), dtype=np.int64)
+    if transport.plan.motion is not None and deployment.messages.loss > 0.0:
+        for node, sender in np.ndindex(links.shape):
+            links[node, sender] = seed_of(deployment, node, _USES + sender)
+    return links
+
+
 def _silences(deployment: Deployment, names: tuple[str, ...]) -> FloatArray:
-    found = [deployment.of_robot(name).silence for name in names]
-    rows = [
-        (inf, inf, 0.0)
-        if one is None
-        else (one.begin, inf if one.duration is None else one.begin + one.duration, _MOTORS[one.motors])
-        for one in found
-    ]
+    rows = [(inf, inf, 0.0, inf, inf)] * (len(names) + 1)
+    for k, name in enumerate(names):
+        own = deployment.of_robot(name)
+        motors = 0.0 if own.silence is None else _MOTORS[own.silence.motors]
+        rows[k] = (*_interval(own.silence), motors, *_interval(own.deaf))
     return np.array(rows).T.copy()
+
+
+def _interval(one: Silence | Deafness | None) -> tuple[float, float]:
+    if one is None:
+        return inf, inf
+    return one.begin, inf if one.duration is None else one.begin + one.duration
 
 
 def believed(team: arrays.LoopTeam, mass_error: float) -> arrays.LoopTeam:
@@ -121,10 +141,18 @@ def believed(team: arrays.LoopTeam, mass_error: float) -> arrays.LoopTeam:
     return team._replace(chains=chains, loads=loads)
 
 
-def nominal_of(transport: CompiledTransport, period: float) -> arrays.LoopNominal:
-    """Return the nominal motions for a control period [s]."""
+def nominal_of(transport: CompiledTransport, deployment: Deployment) -> arrays.LoopNominal:
+    """Return the nominal motions of a run.
+
+    Raises:
+        ScenarioError: Words of a team that passes travel for longer than its plan has time for.
+    """
+    period, nominal = check_deployment(transport, deployment), transport.nominal
     budget, gains = transport.plan.budget, transport.plan.transitions[0].gains
-    nominal = transport.nominal
+    schedule = team_schedule(replace(transport.scenario, deployment=deployment), transport.plan)
+    if schedule is not None:
+        lag = deployment.actuators.lag if budget is None else budget.lag
+        return nominal._replace(schedule=schedule, ahead=0.5 * period + lag)
     if not nominal.position.size or budget is None:
         return nominal
     speed, _, radius, rate = nominal.position
@@ -146,7 +174,8 @@ def memory_of(transport: CompiledTransport, departures: arrays.LoopDepartures) -
     ring, rows = int(departures.periods[0]) + 2, int(departures.periods[1])
     start, widest = transport.plan.start, int(2 * (3 + np.diff(transport.team.first[2]).max()))
     channels = channel_rows(int(departures.periods[2]))
-    nothing = np.zeros(M)
+    nothing, passing = np.zeros(M), robots if transport.plan.motion is not None else 0
+    nodes, oldest = passing + (passing > 0), int(departures.hearing[2].max()) + 2
     return arrays.LoopMemory(
         state=transport.start.copy(),
         current=np.zeros((int(departures.hearing[1].max()) + ring, 2)),
@@ -163,7 +192,12 @@ def memory_of(transport: CompiledTransport, departures: arrays.LoopDepartures) -
         efforts=np.zeros((2, efforts)),
         channels=np.full((robots, channels, READY_SIZE), NOTHING),
         reports=np.full((2, robots, READY_SIZE), NOTHING),
-        alarms=np.tile([0.0, 0.0, 0.0, LONG_AGO], (robots, 1)),
+        alarms=np.tile([0.0, 0.0, 0.0, LONG_AGO, 0.0], (robots, 1)),
+        words=np.tile(first_words(NO_SCHEDULE, robots), (nodes, 1, 1)),
+        said=np.full((oldest, nodes, WORD_SIZE), NOTHING),
+        motions=np.tile(first_motion(), (passing, 1)),
+        phases=np.zeros((ring, passing, 2)),
+        supervised=np.zeros(4),
     )
 
 
@@ -191,6 +225,8 @@ class RunOutcome:
             funnel's bounds over the one that it kept; NaN for a plan without a budget [-].
         alarm_share: Largest measured departure from the nominal motion over its level; NaN for a plan without
             a budget [-].
+        spread: Largest distance of the nominal positions of two robots of a team that passes [m].
+        held: How often such a team came to rest before the end of its motion.
         peak_force: Largest force of a base [N].
         peak_torque: Largest effort of a joint [N m or N]; NaN for a team without joints.
         peak_base_torque: Largest torque of a base [N m].
@@ -212,6 +248,8 @@ class RunOutcome:
     body_clearance: float
     budget_share: float
     alarm_share: float
+    spread: float
+    held: int
     peak_force: float
     peak_torque: float
     peak_base_torque: float
@@ -252,7 +290,7 @@ def run(
         transport.cells,
         team,
         plant,
-        nominal_of(transport, period),
+        nominal_of(transport, deployment),
         departures,
         memory,
         arrays.robot_room(team, memory),
@@ -285,6 +323,8 @@ def _outcome(transport: CompiledTransport, figures: FloatArray, period: float) -
         body_clearance=float(figures[watching.BODY]),
         budget_share=float(figures[watching.SHARE]),
         alarm_share=float(figures[watching.ALARM]),
+        spread=float(figures[watching.SPREAD]),
+        held=int(figures[watching.HOLDS]),
         peak_force=float(figures[watching.FORCE]),
         peak_torque=float(figures[watching.EFFORT]) if transport.plan.joint_names else nan,
         peak_base_torque=float(figures[watching.TORQUE]),
@@ -301,11 +341,12 @@ def _reason(transport: CompiledTransport, figures: FloatArray, axes: tuple[str, 
         int(figures[watching.CELL]),
         figures[watching.VALUE],
     )
-    if figures[watching.ENDED] == watching.HELD:
+    asks = {watching.HELD: "asks for a hold", watching.BRAKED: "lets the drives brake"}
+    if (how := asks.get(int(figures[watching.ENDED]))) is not None:
         k = int(figures[watching.ROBOT])
         robot, (first, last) = transport.robot_names[k], transport.team.first[2, k : k + 2].tolist()
         what = departing_name(int(figures[watching.PLACE]), axes[1 + first : 1 + last])
-        said = f"{robot} asks for a hold: {what} departs {value:.3g} times as far as its level allows"
+        said = f"{robot} {how}: {what} departs {value:.3g} times as far as its level allows"
         return f"at t = {time:.6g} s in cell {cell}: {said}, as {robot} measures it"
     axis = axes[int(figures[watching.PLACE])]
     text = {

@@ -20,17 +20,21 @@ from coop_drake.compiled_loop.arrays import (
     LoopTeam,
     WatchRoom,
 )
-from coop_drake.compiled_loop.robots import heard_cell
+from coop_drake.compiled_loop.robots import begun, heard_cell
 from coop_drake.geometry.polygons import signed_distance
 from coop_drake.jit import compiled
 from coop_drake.laws.axis_table import bounds_of
+from coop_drake.laws.motion import motion_at
+from coop_drake.laws.words import ARRIVED as SEES_ARRIVAL
+from coop_drake.laws.words import HELD as SEES_HOLD
+from coop_drake.laws.words import HOLD, phase_at
 from coop_drake.simulation.clearance import pair_apart, piece_to_walls, place_pieces
 from coop_drake.tree.arrays import FloatArray
 
 ROUNDING = 1e-9
 """More than what rounding errors change of a distance and of the way of a run [m]."""
 
-FIGURES = 20
+FIGURES = 23
 (
     ENDED,
     PLACE,
@@ -52,13 +56,18 @@ FIGURES = 20
     STEP,
     SQUARES,
     TURN,
+    SPREAD,
+    HOLDS,
+    MOVED,
 ) = range(FIGURES)
 """Figures of a run: how it ended, the axis if one ended it, the smallest distance of an axis to a bound of
 its funnel, this axis and its cell, smallest distances of the position to the boundary of its cell, of bodies
 to walls and to each other, the largest share of the budget, largest force and joint effort, number of
 samples, the value and the cell at the end, the robot that ended it, the largest measured departure over its
 level, the largest torque of a base, the largest change of a base's force from sample to sample, the sum over
-all samples of the bases' mean squared force, and the largest change of the object's rate of rotation."""
+all samples of the bases' mean squared force, the largest change of the object's rate of rotation,
+the largest distance of nominal positions of two robots, how often a team that passes came to rest on its
+way, and when it moved on along its motion the last time, or a person held it."""
 
 (
     RUNS,
@@ -72,7 +81,8 @@ all samples of the bases' mean squared force, and the largest change of the obje
     AT_WALL,
     AT_BODY,
     HELD,
-) = range(11)
+    BRAKED,
+) = range(12)
 """How a run may have ended."""
 
 
@@ -116,10 +126,17 @@ def watch(
 
     # Distances of axes to funnels and slices. What one uses of the budget is the least distance to its
     # funnel's bounds that the budget states, over the one that it keeps.
+    passes = nominal.points.size > 0
     for i in range(z.size - 2):
-        heard, time = heard_cell(plant.axis_rows[1, i], sample, now, departures.hearing, memory.current)
-        bounds = bounds_of(cells.tables[heard, plant.axis_rows[0, i]], time)
-        margin = min(z[2 + i] - bounds[0], bounds[1] - z[2 + i])
+        k = plant.axis_rows[1, i]
+        if passes:  # The funnel is the cell that the robot is in.
+            heard = begun(nominal.schedule.begins, memory.phases[(sample - 1) % memory.phases.shape[0], k, 0])
+            lower, upper = cells.slices[0, heard, i], cells.slices[1, heard, i]
+        else:
+            heard, time = heard_cell(k, sample, now, departures.hearing, memory.current)
+            bounds = bounds_of(cells.tables[heard, plant.axis_rows[0, i]], time)
+            lower, upper = bounds[0], bounds[1]
+        margin = min(z[2 + i] - lower, upper - z[2 + i])
         if margin < figures[FUNNEL]:
             figures[FUNNEL], figures[FUNNEL_AXIS], figures[FUNNEL_CELL] = margin, i, cell
         if not margin > 0.0:
@@ -173,8 +190,21 @@ def watch(
     if not figures[BODY] > 0.0:
         end(figures, AT_BODY, figures[BODY])
 
-    # Departures of position, velocity, axes and their rates from their nominal motions.
-    if nominal.flow.size:
+    # How far the robots' nominal positions are apart, and departures of position, velocity, axes and their
+    # rates from their nominal motions.
+    if passes:
+        for k in range(robots):
+            place = room.nominal[k]
+            clock = now + departures.hearing[0, k]
+            phase, pace, _ = phase_at(nominal.schedule, memory.motions[k], clock)
+            motion_at(nominal.points, nominal.span, phase, pace, 0.0, place)
+            if pace > 0.0 or memory.supervised[0] == SEES_HOLD:
+                figures[MOVED] = now
+            for j in range(k):
+                apart = hypot(place[0, 0] - room.nominal[j, 0, 0], place[0, 1] - room.nominal[j, 0, 1])
+                figures[SPREAD] = max(figures[SPREAD], apart)
+        figures[HOLDS] = memory.supervised[2]
+    elif nominal.flow.size:
         led = memory.nominal[sample % memory.nominal.shape[0]]
         vx, vy = memory.state[team.places[1, 0]], memory.state[team.places[1, 1]]
         used = max(used, hypot(z[0] - led[0], z[1] - led[1]) / nominal.position[2])
@@ -189,7 +219,8 @@ def watch(
         figures[SHARE] = used
 
     # Efforts of all robots, the object's rotation, and what the robots' monitors say: the run ends where one
-    # asks for a hold, which this loop lacks, and the robot is named that departs most.
+    # lets the drives brake, or where one asks for a hold and the team cannot be held; the robot is named that
+    # departs most.
     for k in range(robots):
         own = 3 * k + team.first[2, k]
         x, y = memory.efforts[1, own], memory.efforts[1, own + 1]
@@ -205,7 +236,7 @@ def watch(
             figures[EFFORT] = max(figures[EFFORT], abs(memory.efforts[1, own + 3 + i]))
         if nominal.levels.size and not figures[ALARM] > memory.alarms[k, 1]:
             figures[ALARM] = memory.alarms[k, 1]
-        asked = asked or memory.alarms[k, 0] > 0.0
+        asked = asked or (memory.words[robots, k, HOLD] == -inf if passes else memory.alarms[k, 0] > 0.0)
         if memory.alarms[k, 1] > memory.alarms[most, 1]:
             most = k
     rate = memory.state[team.places[1, 2]]
@@ -215,10 +246,14 @@ def watch(
     before[-1] = rate
     if asked and figures[ENDED] == RUNS:
         figures[ROBOT] = most
-        end(figures, HELD, memory.alarms[most, 1], int(memory.alarms[most, 2]))
+        end(figures, BRAKED if passes else HELD, memory.alarms[most, 1], int(memory.alarms[most, 2]))
 
     time = now - entered[1]
-    if cell + 1 == cells.rows.shape[0] and left_by_all(cell, memory.channels):
+    if passes:
+        arrived = memory.supervised[0] == SEES_ARRIVAL
+    else:
+        arrived = cell + 1 == cells.rows.shape[0] and left_by_all(cell, memory.channels)
+    if arrived:
         # How far object and joints are off the goal over what is tolerated, whatever was measured [-].
         away = 0.0
         for k in range(robots):
@@ -229,7 +264,7 @@ def watch(
             for i in range(n):
                 away = max(away, abs(z[3 + first + i] - place[3 + i]) / tolerances[2 + i])
         end(figures, ARRIVED if away <= 1.0 else ASTRAY, away)
-    elif time > cells.numbers[cell, 2]:
+    elif (now - figures[MOVED] if passes else time) > cells.numbers[cell, 2]:
         end(figures, STALLED, time)
     elif now >= departures.times[1]:
         end(figures, LATE, time)

@@ -338,7 +338,7 @@ def run_unwatched(transport, deployment):
     departures = departures_of(transport, deployment)
     period, memory = float(departures.times[0]), memory_of(transport, departures)
     memory.state[transport.order] += displacement(deployment, len(transport.order))
-    team, nominal = believed(transport.team, deployment.mass_error), nominal_of(transport, period)
+    team, nominal = believed(transport.team, deployment.mass_error), nominal_of(transport, deployment)
     room, motion = robot_room(team, memory), plant_room(team, transport.plant)
     for sample in range(round(SECONDS / period) + 1):
         cell = int(memory.current[sample % len(memory.current), 0])

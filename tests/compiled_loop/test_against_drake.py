@@ -10,7 +10,7 @@ from coop_drake.answers.log import SimulationLog
 from coop_drake.campaign.file import load_campaign
 from coop_drake.campaign.plans import Plans
 from coop_drake.campaign.records import RunRecord
-from coop_drake.campaign.runs import RunMaker
+from coop_drake.campaign.runs import RunMaker, _times_held
 from coop_drake.campaign.variation import Variation
 from coop_drake.cli.campaign import _compare, _show_both
 from coop_drake.cli.reporter import Reporter
@@ -23,6 +23,7 @@ from coop_drake.scenario import (
     ActuatorLimits,
     BlockedWheels,
     Control,
+    Deafness,
     Deployment,
     Floor,
     Hold,
@@ -43,6 +44,7 @@ from coop_drake.simulation import build_maps, simulate
 from coop_drake.tuning.objective import outcome_of
 from coop_drake.verification.runs import Rows, budget_share
 from coop_drake.verification.runs.verify_log import check_start
+from tests.support.motions import small_motion
 from tests.support.sampled_block import build_sampled_loop, simulate_sampled
 from tests.support.small_loop import small_maps, small_problem
 from tests.support.system_checks import port_sizes
@@ -304,7 +306,7 @@ def test_ports_of_the_block():
     loop = build_sampled_loop(transport)
     inputs, outputs = port_sizes(loop.controllers)
     assert inputs == {"team_state": 2 * (3 + 2)}
-    assert outputs == {"efforts": 3 * 2 + 2, "telemetry": 3 + 20 * 2 + 2 * 4}
+    assert outputs == {"efforts": 3 * 2 + 2, "telemetry": 4 + 24 * 2 + 2 * 4}
     loop.release()
 
 
@@ -324,9 +326,10 @@ runs:
 
 
 @pytest.mark.slow
-def test_both_tiers_leave_the_same_record(tmp_path, monkeypatch):
+@pytest.mark.parametrize("hand_over", ["rest", "pass"])
+def test_both_tiers_leave_the_same_record(hand_over, tmp_path, monkeypatch):
     path, prepared = tmp_path / "both.campaign.yaml", []
-    path.write_text(FILE)
+    path.write_text(FILE.replace("set: {", f"set: {{planner.hand_over: {hand_over}, "))
     variation = Variation(load_campaign(path))
     plans = Plans(variation, tmp_path)
     monkeypatch.setattr(preparing, "_check", prepared.append)
@@ -356,3 +359,91 @@ def test_a_replay_shows_both_tiers_and_refuses_another_run():
     assert reporter.facts["counted"]
     with pytest.raises(ProcessError, match=r"run 3 of the compiled loop differs .* in steps"):
         _compare(replace(counted, steps=1999), asdict(counted), reporter)
+
+
+# Teams that pass from cell to cell.
+
+CLOCKS = (0.0015, -0.0015)
+"""Errors of the robots' clocks [s]."""
+
+
+def passing_team(at=0.7, **fault):
+    """All that may depart from a passing team, words lost and late, and a fault of robot 0."""
+    faults = {"silence": Silence(at, 0.5), "deaf": Deafness(at, 0.5)}
+    own = {name: faults[name] for name in fault}
+    return replace(
+        EVERYTHING,
+        mass_error=0.03,
+        measurements=Measurements(1e-4, 5e-5, 1e-3, 0.008, loss=0.1, late=0.2, late_by=0.012),
+        robots={
+            "robot_0": RobotDepartures(odometry_scale=0.01, clock_error=CLOCKS[0], switch_delay=0.01, **own),
+            "robot_1": RobotDepartures(clock_error=CLOCKS[1]),
+        },
+        pushes=(),
+        start_offset=StartOffset(),
+    )  # fmt: skip
+
+
+@cache
+def prepared_motion(team="base"):
+    scenario, plan = small_motion(team)
+    return prepare(replace(scenario, deployment=at_200_hz()), plan, small_maps())
+
+
+@pytest.mark.parametrize("fault", ["silence", "deaf"])
+def test_a_team_that_passes_is_held_and_goes_on_in_every_row_as_in_drake(fault):
+    scenario, plan = small_motion()
+    deployment = passing_team(**{fault: True})
+    found, expected = logs_of_both(replace(scenario, deployment=deployment), plan, small_maps())
+    assert expected.reached
+    assert_same(found, expected)
+    outcome = run(prepared_motion(), deployment)
+    assert_agree(outcome, expected)
+    assert outcome.held == _times_held(expected, plan) == 1
+    assert outcome.spread == pytest.approx(expected.governor_spread.max(), rel=0.5)
+
+
+def test_rows_of_a_passing_team_between_samples_agree_too():
+    scenario, plan = small_motion("three")
+    short = replace(scenario.simulator, max_time=0.6, max_step_size=0.003)
+    changed = replace(scenario, deployment=passing_team(), simulator=short)
+    found, expected = logs_of_both(changed, plan, small_maps())
+    assert np.any(np.abs(np.diff(expected.times) - 0.005) > 1e-3)
+    assert_same(found, expected)
+
+
+def test_robots_that_hear_nothing_for_half_a_second_part_by_little_and_go_on():
+    transport = prepared_motion("three")
+    longest = transport.plan.motion.duration
+    for seed, at in enumerate(np.linspace(0.0, longest, 12)):
+        for fault in ({"silence": Silence(at, 0.5)}, {"deaf": Deafness(at, 0.5)}):
+            robots = {
+                "robot_0": RobotDepartures(clock_error=0.002),
+                "robot_1": RobotDepartures(clock_error=-0.002),
+                "robot_2": RobotDepartures(**fault),
+            }
+            words = at_200_hz(robots=robots, messages=Messages(loss=0.2, delay=0.01), seed=seed)
+            outcome = run(transport, words)
+            assert outcome.arrived, outcome.reason
+            assert outcome.spread <= 0.004
+            assert outcome.held <= 2
+
+
+@pytest.mark.parametrize("fault", ["silence", "deaf"])
+def test_a_team_stalls_whose_robot_stays_silent_or_deaf(fault):
+    lasting = {"silence": Silence(0.6), "deaf": Deafness(0.6)}[fault]
+    outcome = run(prepared_motion(), of_one(**{fault: lasting}))
+    assert not outcome.arrived
+    assert "stalled" in outcome.reason
+    assert outcome.held == 1
+
+
+def test_a_passing_team_is_held_by_the_scenario():
+    scenario, plan = small_motion()
+    held = replace(scenario, control=Control(hold=Hold(at=(0.6,), duration=1.0)), deployment=at_200_hz())
+    found, expected = logs_of_both(held, plan, small_maps())
+    assert expected.reached
+    assert_same(found, expected)
+    outcome = run(prepare(held, plan, small_maps()))
+    assert outcome.held == 1
+    assert outcome.time > run(prepared_motion()).time + 1.0

@@ -8,8 +8,10 @@ from functools import cache
 from coop_drake import Found, Scenario, load_scenario, plan
 from coop_drake.answers.plan import Plan
 from coop_drake.answers.problem import PlanningProblem
+from coop_drake.planning.motion import quickest_motion
 from coop_drake.plant.problem import planning_problem
 from coop_drake.scenario.model import RobotLimits
+from tests.support.small_loop import small_problem
 
 LIMITS = {"*": RobotLimits(1.0, 1.0, (1.0,), (2.0,))}
 
@@ -17,6 +19,14 @@ LIMITS = {"*": RobotLimits(1.0, 1.0, (1.0,), (2.0,))}
 def passing(scenario: Scenario) -> Scenario:
     """The scenario of a team that passes from cell to cell, within limits of speeds and joints."""
     return replace(scenario, planner=replace(scenario.planner, hand_over="pass"), limits=LIMITS)
+
+
+@cache
+def small_motion(team: str = "base") -> tuple[Scenario, Plan]:
+    """Scenario and hand-written plan of a team in the open room, with the quickest motion along it."""
+    scenario, found = small_problem(team)
+    scenario = passing(scenario)
+    return scenario, replace(found, motion=quickest_motion(found, planning_problem(scenario), 0.0175))
 
 
 @cache

@@ -20,9 +20,11 @@ from coop_drake.compiled_loop.running import believed, departures_of, memory_of,
 from coop_drake.compiled_loop.watching import left_by_all
 from coop_drake.diagram import closed_loop as stations
 from coop_drake.jit import compiled
+from coop_drake.laws import words
 from coop_drake.laws.actuators import lag_behind
 from coop_drake.laws.axis_table import bounds_of
 from coop_drake.laws.measurements import period_of
+from coop_drake.laws.motion import motion_at
 from coop_drake.laws.robot_dynamics import read_robot
 from coop_drake.plant import build_team_plant
 from coop_drake.plant.team import displacement
@@ -31,14 +33,16 @@ from coop_drake.simulation import run_loop
 from coop_drake.systems import Block
 from coop_drake.systems.block import ALARM_SIZE
 from coop_drake.systems.departures import tilt_floor
+from coop_drake.systems.holds import ASKED, BRAKED, SILENT, TOLD
 from coop_drake.systems.kernels import nominal_margins
 from coop_drake.tree.arrays import FloatArray
 
-SHOWN = 20
+SHOWN = 23
 """Numbers that a robot shows: pose of its base (3), p_G (2), Delta E, its report (2), what its monitor says
-(3), then from ``WANTED`` on the object's desired acceleration (3) and the command of the end effector (6)."""
+(3), its phase where the team passes (3), from ``WANTED`` on the object's desired acceleration (3) and the
+command of the end effector (6)."""
 
-POSE, GOVERNOR, MARGIN, READY, ALARM, WANTED = 0, 3, 5, 6, 8, 11
+POSE, GOVERNOR, MARGIN, READY, ALARM, PHASE, WANTED = 0, 3, 5, 6, 8, 11, 14
 """Where they stand."""
 
 
@@ -51,13 +55,23 @@ def tell(
     """Write what the blocks of all robots and the cell planner would show now, before a sample's updates.
 
     ``memory`` is changed as by a sample, so that it must be a copy; ``number`` is that of the control period
-    that ``now`` [s] is in. ``instant`` receives index of the cell, time of its entry [s] and 1 where the team
-    has arrived, (3,); ``shown`` what ``SHOWN`` lists of every robot, (N, ``SHOWN``); ``bounds`` the lower and
-    upper bounds of the funnels of all axes, (2, M) [rad or m].
+    that ``now`` [s] is in. ``instant`` receives index of the cell, time of its entry [s], 1 where the team
+    has arrived, and why it is held, (4 + N,); ``shown`` what ``SHOWN`` lists of every robot;
+    ``bounds`` the lower and upper bounds of the funnels of all axes, (2, M) [rad or m].
     """
     current, robots = memory.current[sample % memory.current.shape[0]], team.yaws.size
     cell = int(current[0])
     arrived = cell + 1 == cells.rows.shape[0] and left_by_all(cell, memory.channels)
+    passes, point = nominal.points.size > 0, np.empty((3, 3 + cells.slices.shape[2]))
+    if passes:
+        seen, who, known = int(memory.supervised[0]), int(memory.supervised[1]), memory.words[robots]
+        arrived = seen == words.ARRIVED
+        instant[3] = TOLD if seen == words.HELD else 0.0
+        for k in range(robots):
+            braked = known[k, words.HOLD] == -np.inf and known[k, words.EPOCH] == known[robots, words.EPOCH]
+            instant[4 + k] = BRAKED if braked else 0.0
+        if seen in (words.DEPARTS, words.WAITS) and known[robots, words.STAMP] > nominal.schedule.window:
+            instant[4 + who] = ASKED if seen == words.DEPARTS else SILENT
     instant[0], instant[1], instant[2] = current[0], current[1], 1.0 if arrived else 0.0
     robot, governors = np.empty(memory.state.size), memory.governors.copy()
     compute(sample, number, now, True, cells, team, nominal, departures, room, memory)
@@ -75,11 +89,22 @@ def tell(
         if nominal.flow.size:
             edges = cells.governed[cells.first[0, heard] : cells.first[0, heard + 1]]
             row[MARGIN], _ = nominal_margins(edges, cells.numbers[heard, 1], led, led[4:6])
+        if passes:
+            heard, clock = int(memory.reports[0, k, 0]), now + departures.hearing[0, k]
+            row[PHASE], row[PHASE + 1], row[PHASE + 2] = words.phase_at(
+                nominal.schedule, memory.motions[k], clock
+            )
+            motion_at(nominal.points, nominal.span, row[PHASE], row[PHASE + 1], row[PHASE + 2], point)
+            row[GOVERNOR : GOVERNOR + 2] = point[0, :2]
         row[READY : READY + 2] = memory.reports[0, k]
         row[ALARM : ALARM + 3] = memory.alarms[k, :3]
         row[WANTED:] = room.told[k, arrays.ACCELERATION : arrays.COMMAND + 6]
         for i in range(begin, end):
-            bounds[0, i], bounds[1, i] = bounds_of(cells.tables[heard, i], time)[:2]
+            axis = team.first[2, k] + i - begin if i > begin else 0
+            if passes:
+                bounds[0, i], bounds[1, i] = cells.slices[0, heard, axis], cells.slices[1, heard, axis]
+            else:
+                bounds[0, i], bounds[1, i] = bounds_of(cells.tables[heard, i], time)[:2]
 
 
 class SampledTeam(Block):
@@ -92,9 +117,10 @@ class SampledTeam(Block):
     input   ``team_state`` 2 (3 + n)      the plant's positions and velocities, its own order
     output  ``efforts``    3 N + n        what the actuators of every robot give: its base wrench and  W
                                           its joint torques [N, N m]
-    output  ``telemetry``  3 + 20 N + 2 M index of the cell, time of its entry [s], 1 where the team   W
-                                          has arrived; what ``SHOWN`` lists of every robot  ; lower,
-                                          then upper bounds of the funnels of all axes
+    output  ``telemetry``  4 + 24 N + 2 M index of the cell, time of its entry [s], 1 where the team   W
+                                          has arrived, why it is held (1 + N); what ``SHOWN`` lists of
+                                          every robot; lower, then upper bounds of the funnels of all
+                                          axes
     ======= ============== ============== ============================================================ =====
 
     State: one discrete group, updated every period: number of samples so far, time of the last one, then all
@@ -129,7 +155,7 @@ class SampledTeam(Block):
         group = self.discrete_state_ticket(self.DeclareDiscreteState(start))
         timed = {group, self.time_ticket()} if lag > 0.0 else {group}
         self.DeclareVectorOutputPort("efforts", memory.efforts.shape[1], self._write_efforts, timed)
-        size = 3 + shown.size + bounds.size
+        size = 4 + self._robots + shown.size + bounds.size
         self.DeclareVectorOutputPort("telemetry", size, self._write_telemetry)
         self.declare_update(self._step, self._period)
 
@@ -145,14 +171,15 @@ class SampledTeam(Block):
 
     def _write_telemetry(self, context: Context, output: BasicVector) -> None:
         flat, now = context.get_discrete_state_vector().value().copy(), context.get_time()
-        told, begin = output.get_mutable_value(), 3 + self._robots * SHOWN
+        first = 4 + self._robots
+        told, begin = output.get_mutable_value(), first + self._robots * SHOWN
         self._tell(
             self._remembered(flat, self._state.Eval(context)),
             int(flat[0]),
             period_of(now, self._period),
             now,
-            told[:3],
-            told[3:begin].reshape(-1, SHOWN),
+            told[:first],
+            told[first:begin].reshape(-1, SHOWN),
             told[begin:].reshape(2, -1),
         )
 
@@ -175,8 +202,9 @@ class SampledLoop(stations.Loop):
         """Add all outputs that are logged, and return where they stand."""
         joints = [len(robot.joints) for robot in self.team.robots]
         told, efforts = ports.add(self.controllers, "telemetry"), ports.add(self.controllers, "efforts")
-        ends = 3 + SHOWN * len(joints)
-        shown, bounds = told[3:ends].reshape(-1, SHOWN), told[ends:].reshape(2, -1)
+        first, passes = 4 + len(joints), self.plan.motion is not None
+        ends = first + SHOWN * len(joints)
+        shown, bounds = told[first:ends].reshape(-1, SHOWN), told[ends:].reshape(2, -1)
         of_axes = np.split(bounds, np.cumsum([1 + n for n in joints])[:-1], axis=1)
         robots = [
             {
@@ -187,10 +215,13 @@ class SampledLoop(stations.Loop):
                 "hand_command": own[SHOWN - 6 :],
                 "ready": own[READY : READY + 2],
                 "alarm": own[ALARM : ALARM + ALARM_SIZE],
+                **({"phase": own[PHASE : PHASE + 3]} if passes else {}),
             }
             for own, funnels in zip(shown, of_axes, strict=True)
         ]
         supervisor = {"current_cell": told[:2], "arrived": told[2:3]}
+        if passes:
+            supervisor["causes"] = told[3:first]
         return stations.Outputs(
             robots, supervisor, np.split(efforts, np.cumsum([3 + n for n in joints])[:-1])
         )
@@ -203,7 +234,7 @@ def build_sampled_loop(transport: CompiledTransport, deployment: Deployment | No
     block = SampledTeam(
         transport.cells,
         believed(transport.team, deployment.mass_error),
-        nominal_of(transport, float(departures.times[0])),
+        nominal_of(transport, deployment),
         departures,
         memory_of(transport, departures),
     )
