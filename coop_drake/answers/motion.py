@@ -81,3 +81,8 @@ class Motion:
     def duration(self) -> float:
         """How long it takes [s]."""
         return (len(self.points) - 3) * self.period
+
+
+def cell_times(motion: Motion) -> FloatArray:
+    """Return the times from entry to entry, in the last cell to the end, shape (cells,) [s]."""
+    return np.diff(motion.windows[:, 0], append=motion.duration)

@@ -94,8 +94,10 @@ def quickest_plan(
     except (GeometryError, PlanError, StallError) as error:
         raise StallError(f"{error} (these lengths are to be multiplied by {unit:g})") from error
     # Gains have bounds in metres: a team of another size moves at another pace than in its usual unit.
-    plan = timed(with_gains(scale.plan(made), gain_set, gain_set_name))
-    return replace(keep_limits(problem, plan, gain_set), problem=problem_digest(problem))
+    plan = with_gains(scale.plan(made), gain_set, gain_set_name)
+    if problem.settings.hand_over == "rest":
+        plan = keep_limits(problem, timed(plan), gain_set)
+    return replace(plan, problem=problem_digest(problem))
 
 
 def _quickest(
@@ -148,7 +150,7 @@ LENGTH_STEP, ANGLE_STEP = 0.3, 0.15
 """Waypoints are no farther apart than this in position [m] and in every angle or joint [rad or m]: twice as
 many would make the choice of boxes four times as slow."""
 
-PASSING_SHARE = 0.4
+PASSING_SHARE = 0.3
 """Share of these steps where the team passes from cell to cell: overlaps of boxes make it quicker [-]."""
 
 HEARD_AFTER = 0.18
@@ -354,6 +356,7 @@ def choose_boxes(waypoints: Waypoints) -> IntArray:
     least, most = waypoints.path[:, 2:].copy(), waypoints.path[:, 2:].copy()
     travel = np.zeros((n, count))  # The object's time in the longest box so far; infinite: not free.
     lower, upper, goals = np.empty(m), np.empty(m), np.empty((2, m))
+    largest = waypoints.least_clearance if waypoints.passing else LARGEST_CLEARANCE
     for j in range(1, n):
         nexts = 1 if j + 1 == n else count
         for i in range(j):
@@ -364,18 +367,21 @@ def choose_boxes(waypoints: Waypoints) -> IntArray:
                 continue
             for p in range(count):
                 begun = time[i, p] + BOX_COST / waypoints.pads[p]
+                if waypoints.passing and travel[i, p] < np.inf:
+                    travel[i, p] = _passing_time(waypoints.places[j] - waypoints.places[i], waypoints.pads[p])
                 if not begun + travel[i, p] < time[j, :nexts].max():
                     continue
                 for a in range(m):
                     lower[a] = max(waypoints.boxes.lower[a], least[i, a] - waypoints.pads[p])
                     upper[a] = min(waypoints.boxes.upper[a], most[i, a] + waypoints.pads[p])
                 clearances = clearances_in_box(
-                    waypoints.boxes, waypoints.grid, lower, upper, waypoints.path, i, j, LARGEST_CLEARANCE
+                    waypoints.boxes, waypoints.grid, lower, upper, waypoints.path, i, j, largest
                 )
                 if len(clearances) == 0 or clearances.min() < waypoints.least_clearance:
                     travel[i, p] = np.inf
                     continue
-                travel[i, p] = _travel(waypoints, i, j, clearances, waypoints.pads[p])
+                if not waypoints.passing:
+                    travel[i, p] = _travel(waypoints, i, j, clearances)
                 for q in range(nexts):
                     for a in range(m):
                         if j + 1 == n:
@@ -399,26 +405,32 @@ def choose_boxes(waypoints: Waypoints) -> IntArray:
     return rows[first:]
 
 
-@compiled
-def _travel(waypoints: Waypoints, i: int, j: int, clearances: FloatArray, pad: float) -> float:
-    """Time in which the object passes a box, from waypoint i to j [s].
+@compiled(inlined=True)
+def _passing_time(way: float, pad: float) -> float:
+    """Time in which a team that passes from cell to cell crosses a box, from one waypoint to another [s].
 
-    It is that at the governor's steady speed. A team that passes from cell to cell moves at the pace v [-]
-    from which it can stop within the box after it has received all reports of entry. With l the time of the
-    way through the box at the limits of speed, and w the time for reports (``HEARD_AFTER``), v solves
-    w v + v^2 / 2 = l.
+    It moves at the pace v [-] from which it can stop within the box after it has received all reports of
+    entry. With l the time of the way through the box at the limits of speed, and w the time for reports
+    (``HEARD_AFTER``), v solves w v + v^2 / 2 = l.
+
+    Args:
+        way: Time between the waypoints at the limits of speed [s].
+        pad: Padding of the box [rad or m]: seconds at 1 rad/s or 1 m/s.
+    """
+    pace = sqrt(HEARD_AFTER**2 + 2.0 * (way + 2.0 * pad)) - HEARD_AFTER
+    return way / min(1.0, pace)
+
+
+@compiled
+def _travel(waypoints: Waypoints, i: int, j: int, clearances: FloatArray) -> float:
+    """Time in which the object passes a box at the governor's steady speed, from waypoint i to j [s].
 
     Args:
         waypoints: The waypoints.
         i: The first waypoint.
         j: The last one.
         clearances: Clearance at the waypoints in the box, shape (j - i + 1,) [m].
-        pad: Padding of the box [rad or m].
     """
-    if waypoints.passing:
-        way = waypoints.places[j] - waypoints.places[i]
-        pace = sqrt(HEARD_AFTER**2 + 2.0 * (way + 2.0 * pad)) - HEARD_AFTER
-        return float(way / min(1.0, pace))
     stiffness, damping, gain = scheduled_governor(waypoints.schedule, clearances.min())
     per_speed = steady_clearance(1.0, stiffness, damping, gain)
     fastest, seconds = min(gain * FIELD_SPEED, waypoints.limits[0]), 0.0

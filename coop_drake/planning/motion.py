@@ -24,9 +24,10 @@ The optimisation problem. The end time is minimised by an interior-point method:
 logarithmic barrier, and Newton's method uses the Gauss-Newton part of the Hessian. Every term without kappa
 depends on at most four neighbouring control points, so the Hessian is banded. kappa_i couples the control
 points near tau_i to those near x_i; one extra unknown per cell keeps the Hessian sparse. In the first phase
-the times of the control points are free, and every cell keeps its spans. In the second phase all spans last
-equally long, and their length is the only unknown time. Accelerations are then linear between knots, where
-limits are kept; a last slowing keeps them between the knots, too.
+the times of the control points are free, and every cell keeps its spans. In the second phase spans last
+nearly equally long, but some cells may still take longer and others shorter. In the third phase all spans
+last equally long, and their length is the only unknown time. Accelerations are then linear between knots,
+where limits are kept; a last slowing keeps them between the knots, too.
 """
 
 from __future__ import annotations
@@ -34,7 +35,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from itertools import pairwise
 from math import inf, isfinite
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import scipy.linalg
@@ -77,29 +78,29 @@ PERIOD = 0.08
 PARTS = 4
 """Parts of a span of the motion that is made, at whose ends cells may be entered and left [-]."""
 
-OVERLAP_SPANS = 3.0
+OVERLAP_SPANS = 2.0
 """Fewest spans in the overlap of two cells, initially [-]; doubled where no initial path is found."""
 
-CLEARANCE_SPANS = 1.0
+CLEARANCE_SPANS = 0.5
 """Fewest spans in a piece of path that is as long as the clearance there, initially [-]."""
 
 SAMPLES = 24
 """Samples of the first way in a cell [-]."""
 
+EVENNESS, NEARLY_EVEN = 2.0, 1.2
+"""Largest ratio of times between neighbouring control points, in the first and in the second phase [-]."""
+
 SHORTEST_SPAN = 0.01
 """Shortest time between two control points, while the time is free [s]."""
 
 SHORTEST_OVERLAP = 0.03
-"""Shortest time between the control points of one span in every overlap, while the time is free [s]."""
+"""Shortest time between the control points of one span in every overlap, in the first phase [s]."""
 
 BRAKE_RAMP = 0.1
 """r, the time in which the team begins and ends to brake [s]."""
 
-WEIGHTS = (0.2, 0.06, 0.02, 8e-3, 3e-3, 1e-3, 3e-4)
-"""Weights of the barrier while the time is free [s]."""
-
-UNIFORM_WEIGHTS = (2e-4, 3e-5)
-"""Weights of the barrier while spans are equal [s]."""
+WEIGHTS = (0.1, 0.03, 0.01, 3e-3, 1e-3, 3e-4), (2e-4,), (1e-4, 3e-5)
+"""Weights of the barrier in the three phases [s]."""
 
 DONE = 50.0
 """The next weight is taken when a step promises a decrease of less than this many weights [-]."""
@@ -125,6 +126,9 @@ STEPS, ROUNDS = 2, 80
 
 SLOWER = 1.01
 """Factor by which all times grow until every limit is kept [-]."""
+
+SHORTER = 0.4
+"""Factor by which steps are shortened [-]; a step begins with what the last one took, over its square."""
 
 ACCEPTED = 0.01
 """Share of the decrease that the slope promises with which a step is accepted [-]."""
@@ -299,9 +303,10 @@ def brake(
         acting[j, 0] = 0
     for cell in range(len(windows) - 1):
         tau = x = 0.0
+        begin, end = int(windows[cell, 0]), int(windows[cell, 1])
         for e in range(4):
-            tau += time_shares(windows[cell, 0])[e] * points[min(int(windows[cell, 0]) + e, m - 1), T]
-            x += time_shares(windows[cell, 1])[e] * points[min(int(windows[cell, 1]) + e, m - 1), T]
+            tau += _time_shares(windows[cell, 0] - begin)[e] * points[min(begin + e, m - 1), T]
+            x += _time_shares(windows[cell, 1] - end)[e] * points[min(end + e, m - 1), T]
         left = 2.0 * (x - tau - waiting) - BRAKE_RAMP
         if not left > 0.0:
             return False
@@ -317,12 +322,11 @@ def brake(
 
 
 @compiled(inlined=True)
-def time_shares(u: float) -> tuple[float, float, float, float]:
-    """Return by which shares of control points int(u) ... int(u) + 3 t is found at u, or between two knots.
+def _time_shares(s: Any) -> tuple[Any, Any, Any, Any]:
+    """Return by which shares of its control points t is found at s from 0 to 1 in a span, taken linear there.
 
-    Between knots, t is taken linear, as it is where spans are equal.
+    Where spans are equal, it is.
     """
-    s = u - int(u)
     return (1.0 - s) / 6.0, (4.0 - 3.0 * s) / 6.0, (1.0 + 3.0 * s) / 6.0, s / 6.0
 
 
@@ -339,29 +343,30 @@ def quickest_motion(plan: Plan, problem: PlanningProblem, age: float) -> Motion:
     """
     chains, table = team_chains(problem), LIMIT_SHARE * motion_limits(problem.limits)
     cells = cell_sets(plan)
-    free = np.where([True, True, False], table, inf)  # Jerk is limited where spans are equal.
+    free = np.where([True, True, False], table, inf)  # Jerk is limited where spans are about equal.
     for finer in range(FINER + 1):
         points = first_points(plan, chains, table, OVERLAP_SPANS * 2**finer)
         points = np.column_stack([points, SPAN_TIME * (np.arange(len(points)) - 1.0)])
         try:
-            program = _Program(cells, chains, free, WAITING, points, uniform=False)
+            last = _Program(cells, chains, free, WAITING, points, EVENNESS, parts=1)
             break
         except PlanError:
             if finer == FINER:
                 raise
-    program.solve(WEIGHTS)
-    for finer in range(FINER + 1):
-        equal = uniform_points(program.points, PERIOD / 2**finer)
-        try:
-            last = _Program(cells, chains, table, WAITING, equal, uniform=True)
-        except PlanError:
-            if finer == FINER:
-                raise
-            continue
-        last.solve(UNIFORM_WEIGHTS)
-        factor = last.slow_down()
-        if factor < MUCH_SLOWER:
-            break
+    last.solve(WEIGHTS[0])
+    for evenness, weights in ((NEARLY_EVEN, WEIGHTS[1]), (1.0, WEIGHTS[2])):
+        before = last.points
+        for finer in range(FINER + 1):
+            equal = uniform_points(before, PERIOD / 2**finer)
+            try:
+                last = _Program(cells, chains, table, WAITING, equal, evenness, PARTS)
+            except PlanError:
+                if finer == FINER:
+                    raise
+                continue
+            last.solve(weights)
+            if not last.uniform or last.slow_down() < MUCH_SLOWER:
+                break
     period = float(last.points[2, -1] - last.points[1, -1])
     made = last.points[:, :-1].copy(), period, period * last.windows, last.kappa.copy()
     damping = min(LARGEST_DAMPING, AGE_PHASE / age) if age > 0.0 else LARGEST_DAMPING
@@ -406,13 +411,16 @@ class _Program:
         limits: Largest velocities, accelerations and jerks, see ``motion_limits``.
         waiting: 2 W [s].
         points: Control points (z, t), shape (m, D).
-        uniform: Whether all spans last equally long.
+        evenness: Largest ratio of times between neighbouring control points, 1 for equal spans [-].
+        parts: Parts of a span, at whose ends cells may be entered and left [-].
 
-    Besides, it has the parts of a span (``shares``), the first and the last piece of every cell (``first``,
-    ``last``), u at which the motion enters and leaves every cell (``windows``, shape (cells, 2)), kappa and
-    where it acts (``kappa``, ``acting``, see ``brake``), which unknowns are held (``held``), how they change
-    with the length of a span (``lengths``), least times between control points (``shortest``), the
-    ``course`` of ``barrier``, and after ``slow_down`` the rate of starts on the way (``start_rate``).
+    Besides, it has the Bezier points of these parts (``shares``), whether spans are equal (``uniform``), the
+    first and the last piece of every cell (``first``, ``last``), u at which the motion enters and leaves
+    every cell (``windows``, shape (cells, 2)), kappa and where it acts (``kappa``, ``acting``, see
+    ``brake``), which unknowns are held (``held``), how they change with the length of a span (``lengths``),
+    least times between control points (``shortest``), the ``course`` of ``barrier``, the share of Newton's
+    step that was taken last (``share``), and after ``slow_down`` the rate of starts on the way
+    (``start_rate``).
     """
 
     cells: CellSets
@@ -420,11 +428,12 @@ class _Program:
     limits: FloatArray
     waiting: float
     points: FloatArray
-    uniform: bool
+    evenness: float
+    parts: int
 
     def __post_init__(self) -> None:
         """Find the pieces of cells, and what is held: rest at both ends, and the time at the beginning."""
-        self.shares = bezier_points(PARTS if self.uniform else 1)
+        self.shares, self.uniform = bezier_points(self.parts), self.evenness == 1.0
         self.first, self.last = pieces_of_cells(self._inside(self.shares))
         m, D = self.points.shape
         fixed = np.zeros((m, D), bool)
@@ -434,6 +443,7 @@ class _Program:
         if self.uniform:
             self.lengths[D - 1 :: D] = np.arange(m) - 1.0
         self.kappa, self.acting = np.zeros(len(self.first)), np.zeros((m, 1 + BRAKES), np.int64)
+        self.share = 1.0
 
     def _inside(self, shares: FloatArray) -> NDArray[np.bool_]:
         return pieces_inside(self.cells, self.points[:, :-1], shares)
@@ -480,7 +490,7 @@ class _Program:
         if not least > 0.0:
             raise PlanError("a span of the motion meets the boundary of its cell")
         self.shortest = np.full(len(self.points) - 1, SHORTEST_SPAN)
-        if not self.uniform:
+        if parts == 1:
             steps = np.diff(self.points[:, -1])
             for before, after in zip(self.last[:-1], self.first[1:], strict=True):
                 longest = after + int(np.argmax(steps[after + 1 : before + 2]))
@@ -497,43 +507,40 @@ class _Program:
         value = float(points[-2, -1])
         value += barrier(points, weight, self.course, self.kappa, self.acting, given, slopes is not None)
         if not self.uniform:
-            value += add_times(points, 0.1 * weight, self.shortest, given, slopes is not None)
+            value += add_times(points, 0.1 * weight, self.shortest, self.evenness, given, slopes is not None)
         return value
 
     def improve(self, weight: float) -> bool:
         """Take a few Newton steps; returns whether the next weight may be taken."""
         (m, D), cells = self.points.shape, len(self.first)
-        now = self.value(self.points, weight)
-        while not isfinite(now):
-            self.points[:, -1] *= SLOWER
-            if not self.points[-2, -1] < 1e4:
-                raise PlanError("no pace keeps the limits in the plan's cells")
-            now = self.value(self.points, weight)
         for _ in range(STEPS):
-            slopes = Slopes(
-                np.zeros((m * D, 4 * D)), np.zeros(m * D), np.zeros((cells, m * D)), np.zeros(cells),
-                np.zeros(cells),
-            )  # fmt: skip
-            self.value(self.points, weight, slopes)
+            shapes = (m * D, 4 * D), m * D, (cells, m * D), cells, cells
+            slopes = Slopes(*(np.zeros(shape) for shape in shapes))
+            while not isfinite(now := self.value(self.points, weight, slopes)):
+                self.points[:, -1] *= SLOWER
+                if not self.points[-2, -1] < 1e4:
+                    raise PlanError("no pace keeps the limits in the plan's cells")
+                for each in slopes:
+                    each[:] = 0.0
             slopes.point[(m - 2) * D + D - 1] += 1.0
-            step, places, shares = np.empty(m * D), np.zeros((cells, 8), np.int64), np.zeros((cells, 8))
-            for cell in range(cells - 1):
-                for end, sign in enumerate((2.0, -2.0)):
-                    u = self.windows[cell, end]
-                    each = slice(4 * end, 4 * end + 4)
-                    places[cell, each] = (np.minimum(int(u) + np.arange(4), m - 1) + 1) * D - 1
-                    shares[cell, each] = sign * self.kappa[cell] * np.array(time_shares(u))
+            u, last, step = self.windows[:-1], len(self.points) - 1, np.empty(m * D)
+            places, shares = np.zeros((cells, 8), np.int64), np.zeros((cells, 8))
+            at = (np.minimum(u.astype(int)[..., None] + np.arange(4), last) + 1) * D - 1
+            by = np.stack(_time_shares(u - u.astype(int)), axis=2) * [[[2.0], [-2.0]]]
+            places[:-1] = at.reshape(-1, 8)
+            shares[:-1] = (self.kappa[:-1, None, None] * by).reshape(-1, 8)
             slope = newton_step(slopes, places, shares, self.held, self.lengths, step)
-            share = 1.0
+            share = min(1.0, self.share / SHORTER**2)
             while share > 1e-5:
                 moved = self.points + share * step.reshape(m, D)
                 then = self.value(moved, weight)
                 if then < now + ACCEPTED * share * slope:
                     break
-                share *= 0.4
+                share *= SHORTER
             else:
+                self.share = 1.0
                 return True
-            self.points, now = moved, then
+            self.points, self.share = moved, share
             if -slope < 3.0 * weight:
                 return True
         return -slope < DONE * weight

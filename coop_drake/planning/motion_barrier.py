@@ -16,9 +16,6 @@ from coop_drake.jit import compiled
 from coop_drake.planning.motion_limits import Chains, follow
 from coop_drake.tree.arrays import FloatArray, IntArray
 
-EVENNESS = 2.0
-"""Largest ratio of times between neighbouring control points [-]: derivatives by u stay meaningful."""
-
 BRAKES = 6
 """Largest number of cells in which the team may have to brake at one knot [-]."""
 
@@ -115,8 +112,10 @@ def barrier(
         for point in range(P):
             if not course.limits[point].min() < np.inf:
                 continue
-            size = follow(course.chains, point, x, v, a, moved, by)
-            first[:], second[:] = 0.0, 0.0
+            size = follow(course.chains, point, x, v, a, moved, by, derive)
+            if derive:
+                first[:], second[:] = 0.0, 0.0
+            lefts = 1.0  # Their product: one logarithm is quicker than many.
             # The velocity; then s A - kappa V with (s, kappa) = (1, 0), and (1, kappa), (0, kappa) for cells.
             for case in range(2 + 2 * acts):
                 limit = course.limits[point, min(case, 1)]
@@ -134,7 +133,7 @@ def barrier(
                 left = 1.0 - share * square
                 if not left > 0.0:
                     return np.inf
-                total -= weight * log(left)
+                lefts *= left
                 if not derive:
                     continue
                 force = 2.0 * share * weight / left
@@ -171,7 +170,8 @@ def barrier(
                 left = 1.0 - square / (jerk * jerk)
                 if not left > 0.0:
                     return np.inf
-                total -= weight * log(left)
+                lefts *= left
+            total -= weight * log(lefts)
             for i in range(size):
                 last[point, i] = moved[1, i]
             if not derive:
@@ -307,8 +307,19 @@ def _add_line(
 
 
 @compiled(borrows=True)
-def add_times(points: FloatArray, weight: float, shortest: FloatArray, slopes: Slopes, derive: bool) -> float:
-    """Return the barrier of the times between control points; add its derivatives."""
+def add_times(
+    points: FloatArray, weight: float, shortest: FloatArray, evenness: float, slopes: Slopes, derive: bool
+) -> float:
+    """Return the barrier of the times between control points; add its derivatives.
+
+    Args:
+        points: Control points (z, t), shape (m, D).
+        weight: Weight of the barrier [s].
+        shortest: Shortest times, shape (m - 1,) [s].
+        evenness: Largest ratio of neighbouring times [-].
+        slopes: Receives the derivatives.
+        derive: Whether they are wanted.
+    """
     m, D = points.shape
     total = 0.0
     for j in range(1, m - 1):
@@ -319,9 +330,9 @@ def add_times(points: FloatArray, weight: float, shortest: FloatArray, slopes: S
             elif case == 1:
                 left, shares = after - shortest[j], (0.0, -1.0, 1.0)
             elif case == 2:
-                left, shares = EVENNESS * before - after, (-EVENNESS, EVENNESS + 1.0, -1.0)
+                left, shares = evenness * before - after, (-evenness, evenness + 1.0, -1.0)
             else:
-                left, shares = EVENNESS * after - before, (1.0, -EVENNESS - 1.0, EVENNESS)
+                left, shares = evenness * after - before, (1.0, -evenness - 1.0, evenness)
             if not left > 0.0:
                 return np.inf
             total -= weight * log(left)
@@ -338,6 +349,7 @@ def _add_cells(points: FloatArray, weight: float, course: Course, slopes: Slopes
     for piece in range(course.spans.size):
         span, shares = course.spans[piece], course.shares[piece]
         for b in range(4):
+            lefts = 1.0
             for k in range(2, d):
                 low, high, value = course.lower[piece, k - 2], course.upper[piece, k - 2], 0.0
                 for e in range(4):
@@ -345,7 +357,7 @@ def _add_cells(points: FloatArray, weight: float, course: Course, slopes: Slopes
                 if not (low < value < high):
                     return np.inf
                 below, above = value - low, high - value
-                total -= weight * (log(below / (high - low)) + log(above / (high - low)))
+                lefts *= below * above / (high - low) ** 2
                 if derive:
                     first, second = weight / above - weight / below, weight / above**2 + weight / below**2
                     for e in range(4):
@@ -363,10 +375,13 @@ def _add_cells(points: FloatArray, weight: float, course: Course, slopes: Slopes
                 left = nx * px + ny * py - course.planes[piece, f, 2]
                 if not left > 0.0:
                     return np.inf
-                total -= weight * log(left)
+                lefts *= left
+                if not derive:
+                    continue
                 first, second = weight / left, weight / (left * left)
                 gx, gy = gx - first * nx, gy - first * ny
                 xx, xy, yy = xx + second * nx * nx, xy + second * nx * ny, yy + second * ny * ny
+            total -= weight * log(lefts)
             if derive:
                 for e in range(4):
                     slopes.point[(span + e) * D] += gx * shares[b, e]
@@ -395,6 +410,9 @@ def newton_step(
     H p + M' l - B' n = -g and M p + L l + n = -g_l. Where all spans are equally long, p has one more unknown,
     h, the change of that length, which moves the times of all control points.
 
+    The symmetric system is eliminated in the order of the control points. l and n of a cell depend on those
+    from its brake's beginning to the cell's end. They are eliminated behind the last of them; h comes last.
+
     Args:
         slopes: H, g, M, L and g_l.
         places: Columns of B's entries, shape (cells, E).
@@ -404,122 +422,170 @@ def newton_step(
         step: Receives the step, shape (m D,).
     """
     (n, width), cells = slopes.band.shape, len(places)
-    extra = 2 * cells + 1
-    along, length = np.zeros(n), 0
+    last = 2 * cells  # Place of h among l and n of all cells, which alternate.
+    # Rows of l, n and h: by the control points, by themselves, and right sides.
+    by_points, corner, ends = (
+        np.zeros((last + 1, n + width)),
+        np.zeros((last + 1, last + 1)),
+        np.zeros(last + 1),
+    )
     for j in range(n):
-        length = max(length, int(lengths[j] != 0.0))
-        along[j] += slopes.band[j, 0] * lengths[j]
-        for k in range(1, min(width, n - j)):
-            along[j] += slopes.band[j, k] * lengths[j + k]
-            along[j + k] += slopes.band[j, k] * lengths[j]
-    sides = np.zeros((n, 1 + extra))  # g, M', B', H lengths
-    system, right = np.zeros((extra, extra)), np.zeros(extra)
-    begin, end = np.zeros(cells, np.int64), np.zeros(cells, np.int64)
-    last = 2 * cells
+        for k in range(min(width, n - j)):
+            by_points[last, j] += slopes.band[j, k] * lengths[j + k]
+            if k > 0:
+                by_points[last, j + k] += slopes.band[j, k] * lengths[j]
+    for j in range(n):
+        corner[last, last] += by_points[last, j] * lengths[j]
+        ends[last] -= slopes.point[j] * lengths[j]
+    if corner[last, last] == 0.0:
+        corner[last, last] = 1.0
+    begin, end = np.full(cells, n), np.zeros(cells, np.int64)
     for cell in range(cells):
-        end[cell] = -1
+        one, other = 2 * cell, 2 * cell + 1
+        corner[one, one], ends[one] = slopes.rates[cell], -slopes.rate[cell]
+        corner[one, other] = corner[other, one] = 1.0
         for j in range(n):
             if slopes.mixed[cell, j] != 0.0:
-                begin[cell] = j if end[cell] < 0 else begin[cell]
-                end[cell] = j
-                system[cells + cell, last] += slopes.mixed[cell, j] * lengths[j]
-                if not held[j]:
-                    sides[j, 1 + cell] = slopes.mixed[cell, j]
+                begin[cell], end[cell] = min(begin[cell], j), j
+                by_points[one, j] = slopes.mixed[cell, j]
+                corner[one, last] += slopes.mixed[cell, j] * lengths[j]
         for e in range(places.shape[1]):
             j = places[cell, e]
-            system[cell, last] += shares[cell, e] * lengths[j]
-            if not held[j]:
-                sides[j, 1 + cells + cell] += shares[cell, e]
+            begin[cell], end[cell] = min(begin[cell], j), max(end[cell], j)
+            by_points[other, j] -= shares[cell, e]
+            corner[other, last] -= shares[cell, e] * lengths[j]
+        for row in (one, other):
+            corner[last, row] = corner[row, last]
     for j in range(n):
-        system[last, last] += along[j] * lengths[j]
-        right[last] -= slopes.point[j] * lengths[j]
-        if not held[j]:
-            sides[j, 0], sides[j, 1 + last] = slopes.point[j], along[j]
-    given, damping = sides.copy(), 1e-8
-    lower = np.empty((n, width))
+        if held[j]:
+            by_points[:, j] = 0.0
+    band, rows, right, sides = (
+        np.empty((n + width, width)),
+        by_points.copy(),
+        np.zeros(n + width),
+        ends.copy(),
+    )
+    whole, damping, active = corner.copy(), 1e-8, np.empty(last + 1, np.int64)
     while True:
+        band[n:] = 0.0
         for j in range(n):
-            for k in range(min(width, n - j)):
-                lower[j, k] = 0.0 if held[j] or held[j + k] else slopes.band[j, k]
-            lower[j, 0] = 1.0 if held[j] else lower[j, 0] * (1.0 + damping) + 1e-7
-        sides[:] = given
-        if _solve_band(lower, sides):
+            for k in range(width):
+                band[j, k] = 0.0 if j + k >= n or held[j] or held[j + k] else slopes.band[j, k]
+            band[j, 0] = 1.0 if held[j] else band[j, 0] * (1.0 + damping) + 1e-7
+            right[j] = 0.0 if held[j] else -slopes.point[j]
+        if _eliminate(band, right, rows, whole, sides, begin, end, active):
             break
-        damping *= 100.0
-    # p = -H^-1 (g + M' l - B' n + H lengths h)
-    for cell in range(cells):
-        system[last, cell], system[last, cells + cell] = system[cells + cell, last], -system[cell, last]
-        system[cell, cell] -= 1.0
-        system[cells + cell, cells + cell] += 1.0
-        right[cells + cell] -= slopes.rate[cell]
-        system[cells + cell, cell] += slopes.rates[cell]
-        for j in range(max(begin[cell], 0), end[cell] + 1):
-            if not held[j] and slopes.mixed[cell, j] != 0.0:
-                _add_row(system, right, cells + cell, slopes.mixed[cell, j], sides[j], cells)
-        for e in range(places.shape[1]):
-            if not held[places[cell, e]]:
-                _add_row(system, right, cell, shares[cell, e], sides[places[cell, e]], cells)
-    for j in range(n):
-        if not held[j]:
-            _add_row(system, right, last, along[j], sides[j], cells)
-    if length == 0:
-        system[last, last] = 1.0
-    found = np.linalg.solve(system, right)
+        rows[:], whole[:], sides[:], damping = by_points, corner, ends, 100.0 * damping
+    # Back from the last unknown to the first; ``sides`` and ``right`` become the unknowns.
+    sides[last] /= whole[last, last]
+    for j in range(n - 1, -1, -1):
+        for cell in range(cells - 1, -1, -1):
+            if end[cell] != j:
+                continue
+            one, other = 2 * cell, 2 * cell + 1
+            a, b = (
+                sides[one] - whole[one, last] * sides[last],
+                sides[other] - whole[other, last] * sides[last],
+            )
+            for k in range(1, width):
+                a -= rows[one, j + k] * right[j + k]
+                b -= rows[other, j + k] * right[j + k]
+            for c in range(cells):
+                if end[c] > j or (end[c] == j and c > cell):
+                    for row in (2 * c, 2 * c + 1):
+                        a -= whole[one, row] * sides[row]
+                        b -= whole[other, row] * sides[row]
+            det = whole[one, one] * whole[other, other] - whole[one, other] ** 2
+            sides[one] = (whole[other, other] * a - whole[one, other] * b) / det
+            sides[other] = (whole[one, one] * b - whole[one, other] * a) / det
+        value = right[j] - rows[last, j] * sides[last]
+        for k in range(1, width):
+            value -= band[j, k] * right[j + k]
+        for cell in range(cells):
+            if begin[cell] <= j <= end[cell]:
+                value -= rows[2 * cell, j] * sides[2 * cell] + rows[2 * cell + 1, j] * sides[2 * cell + 1]
+        right[j] = value / band[j, 0]
     slope = 0.0
     for j in range(n):
-        value = -sides[j, 0]
-        for k in range(extra):
-            value -= (sides[j, 1 + k] if not cells <= k < last else -sides[j, 1 + k]) * found[k]
-        step[j] = value + found[last] * lengths[j]
+        step[j] = right[j] + sides[last] * lengths[j]
         slope += slopes.point[j] * step[j]
     for cell in range(cells):
-        slope += slopes.rate[cell] * found[cell]
+        slope += slopes.rate[cell] * sides[2 * cell]
     return slope
 
 
 @compiled(borrows=True)
-def _add_row(
-    system: FloatArray, right: FloatArray, row: int, share: float, solved: FloatArray, cells: int
-) -> None:
-    """Add share p_j to a row of the system, p_j by the unknowns l, n and h."""
-    right[row] += share * solved[0]
-    for k in range(cells):
-        system[row, k] -= share * solved[1 + k]
-        system[row, cells + k] += share * solved[1 + cells + k]
-    system[row, 2 * cells] -= share * solved[1 + 2 * cells]
-
-
-@compiled(borrows=True)
-def _solve_band(lower: FloatArray, sides: FloatArray) -> bool:
-    """Solve in place by Cholesky's method; return whether the matrix is positive definite.
+def _eliminate(
+    band: FloatArray, right: FloatArray, rows: FloatArray, whole: FloatArray, sides: FloatArray,
+    begin: IntArray, end: IntArray, active: IntArray,
+) -> bool:  # fmt: skip
+    """Eliminate all unknowns but the last one; return whether the pivots have the signs of a minimum.
 
     Args:
-        lower: The matrix: every unknown by itself and the next ones, shape (n, width); its factor.
-        sides: Right sides, shape (n, sides); the solutions.
+        band: The control points by themselves and the next ones, shape (n + width, width).
+        right: Their right sides, shape (n + width,).
+        rows: l, n and h by the control points, shape (2 cells + 1, n + width).
+        whole: l, n and h by themselves, shape (2 cells + 1, 2 cells + 1).
+        sides: Their right sides, shape (2 cells + 1,).
+        begin: The first control point's unknown on which l and n of a cell depend, shape (cells,).
+        end: The last one, shape (cells,).
+        active: Room, shape (2 cells + 1,).
     """
-    (n, width), count = lower.shape, sides.shape[1]
+    width, cells, last = band.shape[1], len(begin), len(sides) - 1
+    n = len(right) - width
     for j in range(n):
-        if not lower[j, 0] > 0.0:
+        count, pivot = 1, band[j, 0]
+        active[0] = last
+        for cell in range(cells):
+            if begin[cell] <= j <= end[cell]:
+                active[count], active[count + 1] = 2 * cell, 2 * cell + 1
+                count += 2
+        if not pivot > 0.0:
             return False
-        lower[j, 0] = np.sqrt(lower[j, 0])
-        reach = min(width, n - j)
-        for k in range(1, reach):
-            lower[j, k] /= lower[j, 0]
-        for c in range(count):
-            sides[j, c] /= lower[j, 0]
-        for k in range(1, reach):
-            factor = lower[j, k]
+        for k in range(1, width):
+            factor = band[j, k] / pivot
             if factor != 0.0:
-                for m in range(k, reach):
-                    lower[j + k, m - k] -= factor * lower[j, m]
-                for c in range(count):
-                    sides[j + k, c] -= factor * sides[j, c]
-    for j in range(n - 1, -1, -1):
-        for k in range(1, min(width, n - j)):
-            for c in range(count):
-                sides[j, c] -= lower[j, k] * sides[j + k, c]
-        for c in range(count):
-            sides[j, c] /= lower[j, 0]
+                for m in range(k, width):
+                    band[j + k, m - k] -= factor * band[j, m]
+                right[j + k] -= factor * right[j]
+        for a in range(count):
+            row = active[a]
+            factor = rows[row, j] / pivot
+            if factor == 0.0:
+                continue
+            for k in range(1, width):
+                rows[row, j + k] -= factor * band[j, k]
+            sides[row] -= factor * right[j]
+            for b in range(count):
+                whole[row, active[b]] -= factor * rows[active[b], j]
+        for cell in range(cells):
+            if end[cell] != j:
+                continue
+            one, other = 2 * cell, 2 * cell + 1
+            p, q, r = whole[one, one], whole[one, other], whole[other, other]
+            det = p * r - q * q
+            if not det < 0.0:
+                return False
+            for k in range(1, width):
+                a, b = rows[one, j + k], rows[other, j + k]
+                if a == 0.0 and b == 0.0:
+                    continue
+                a, b = (r * a - q * b) / det, (p * b - q * a) / det
+                for m in range(k, width):
+                    band[j + k, m - k] -= a * rows[one, j + m] + b * rows[other, j + m]
+                right[j + k] -= a * sides[one] + b * sides[other]
+            for i in range(count):
+                row = active[i]
+                # l and n of cells that are eliminated, this one included, count no more.
+                if row < last and (end[row // 2] < j or (end[row // 2] == j and row // 2 <= cell)):
+                    continue
+                a, b = whole[row, one], whole[row, other]
+                a, b = (r * a - q * b) / det, (p * b - q * a) / det
+                for k in range(1, width):
+                    rows[row, j + k] -= a * rows[one, j + k] + b * rows[other, j + k]
+                sides[row] -= a * sides[one] + b * sides[other]
+                for m in range(count):
+                    whole[row, active[m]] -= a * whole[one, active[m]] + b * whole[other, active[m]]
     return True
 
 

@@ -159,7 +159,7 @@ def times_at_limits(chains: Chains, limits: FloatArray, points: FloatArray) -> F
 @compiled(borrows=True)
 def follow(
     chains: Chains, point: int, x: FloatArray, v: FloatArray, a: FloatArray, moved: FloatArray,
-    by: FloatArray,
+    by: FloatArray, derive: bool,
 ) -> int:  # fmt: skip
     """Write velocity and acceleration of a point, and their derivatives by z, z' and z''.
 
@@ -171,12 +171,13 @@ def follow(
         a: z''.
         moved: Receives V and A, shape (2, 2); of one that is a number its first entry counts.
         by: Receives dV/dz, dV/dz' (which is dA/dz''), dA/dz and dA/dz', shape (4, 2, 3 + n).
+        derive: Whether these are wanted.
 
     Returns:
         Of how many numbers V and A consist.
     """
     bases, d = chains.links.size, x.size
-    for i in range(4):
+    for i in range(4 if derive else 0):
         for j in range(2):
             for k in range(d):
                 by[i, j, k] = 0.0
@@ -217,7 +218,7 @@ def follow(
         moved[0, 1] += w * ux + rate * dy
         moved[1, 0] += -turning * uy - w * w * ux - 2.0 * w * rate * dy + push * dx
         moved[1, 1] += turning * ux - w * w * uy + 2.0 * w * rate * dx + push * dy
-        for k in range(2, d):
+        for k in range(2, d if derive else 0):
             turn = chains.turns[base, link, k - 2]
             if turn != 0.0:
                 by[0, 0, k] += turn * (-w * ux - rate * dy)
@@ -228,7 +229,7 @@ def follow(
                 by[2, 1, k] += turn * (-turning * uy - w * w * ux - 2.0 * w * rate * dy + push * dx)
                 by[3, 0, k] += turn * (-2.0 * w * ux - 2.0 * rate * dy)
                 by[3, 1, k] += turn * (-2.0 * w * uy + 2.0 * rate * dx)
-        if slide >= 2:
+        if slide >= 2 and derive:
             by[0, 0, slide] -= w * dy
             by[0, 1, slide] += w * dx
             by[1, 0, slide] += dx
@@ -272,7 +273,7 @@ def largest_shares(
             motion_at(points, period, time, 1.0, 0.0, nominal)
             x, v, a = nominal[0], nominal[1], nominal[2]
             for point in range(len(limits)):
-                size = follow(chains, point, x, v, a, moved, by)
+                size = follow(chains, point, x, v, a, moved, by, False)
                 speed = np.sqrt((moved[0, :size] ** 2).sum())
                 fastest, longest = (
                     max(fastest, speed / limits[point, 0]),

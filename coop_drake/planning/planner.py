@@ -15,6 +15,7 @@ from shapely.errors import ShapelyError
 
 from coop_drake.answers.budget import Budget
 from coop_drake.answers.document import problem_digest
+from coop_drake.answers.motion import cell_times
 from coop_drake.answers.plan import (
     SLOWEST_AGE,
     BeyondLimits,
@@ -98,33 +99,9 @@ def plan(
         if isinstance(near, Found | BeyondLimits):
             near = replace(near, plan=replace(near.plan, problem=problem_digest(problem)))
         if isinstance(near, Found):
-            return _passing(near, problem, gain_set, progress)
-    answer = _passing(
-        _answer(problem, gain_set, gain_set_name, budget, progress, find_path), problem, gain_set, progress
-    )
+            return near
+    answer = _answer(problem, gain_set, gain_set_name, budget, progress, find_path)
     return near if isinstance(answer, Undecided) and isinstance(near, BeyondLimits) else answer
-
-
-def _passing(
-    answer: PlanningResult, problem: PlanningProblem, gain_set: GainSet, progress: Progress | None
-) -> PlanningResult:
-    """Give a plan its motion where the team shall pass from cell to cell."""
-    if problem.settings.hand_over != "pass" or not isinstance(answer, Found):
-        return answer
-    from coop_drake.planning.motion import quickest_motion  # Here: it imports scipy.
-
-    age = gain_set.age if isinstance(gain_set, ScheduledGains) else 0.0
-    if progress is not None:
-        with suppress(PatienceError):  # The plan is certified: it gets its motion.
-            progress("planning the motion through all cells", 0.0)
-    try:
-        return replace(answer, plan=replace(answer.plan, motion=quickest_motion(answer.plan, problem, age)))
-    except (PlanError, np.linalg.LinAlgError) as error:
-        return Undecided(
-            f"a plan was found, but no motion through its cells without a stop: {error}; "
-            "with planner.hand_over: rest that plan is returned",
-            answer.report,
-        )
 
 
 def _answer(
@@ -188,8 +165,8 @@ def _found(
 def _without_limits(
     problem: PlanningProblem, found: Channel | CoveredPath, gain_set: GainSet, name: str, *, slowly: bool
 ) -> Plan | None:
-    """A plan for a team without limits, and the limits that refuse it; None if there is none."""
-    factor = 1.0
+    """A plan for a team that rests in every cell, without limits, and the limits that refuse it, if any."""
+    problem, factor = replace(problem, settings=replace(problem.settings, hand_over="rest")), 1.0
     if slowly and isinstance(gain_set, ScheduledGains):
         factor, gain_set = AGE_FACTORS[-1], gain_set.slowed(AGE_FACTORS[-1])
     asked = ended(problem, found)
@@ -241,6 +218,8 @@ def _made(
     found: Channel | CoveredPath,
     progress: Progress | None = None,
 ) -> Plan | BeyondBudget:
+    if problem.settings.hand_over == "pass":
+        return _passing(problem, found, gain_set, name, progress)
     if budget is None:
         return _slow_enough(problem, found, gain_set, name, progress)
     if not isinstance(gain_set, ScheduledGains):
@@ -251,6 +230,39 @@ def _made(
     if isinstance(made, Plan) and (broken := refusals(problem, made)):
         raise StallError("under the budget, " + "; ".join(refusal.describe() for refusal in broken))
     return made
+
+
+def _passing(
+    problem: PlanningProblem,
+    found: Channel | CoveredPath,
+    gain_set: GainSet,
+    name: str,
+    progress: Progress | None,
+) -> Plan:
+    """The plan of a team that passes from cell to cell, with its motion: this keeps the limits."""
+    from coop_drake.planning.motion import quickest_motion  # Here: it imports scipy.
+
+    made = quickest_plan(problem, found, gain_set, gain_set_name=name, progress=progress)
+    if progress is not None:
+        with suppress(PatienceError):  # The plan is certified: it gets its motion.
+            progress("planning the motion through all cells", 0.0)
+    age = gain_set.age if isinstance(gain_set, ScheduledGains) else 0.0
+    try:
+        motion = quickest_motion(made, problem, age)
+    except (PlanError, np.linalg.LinAlgError) as error:
+        raise StallError(
+            f"no motion through its cells without a stop was found: {error}; "
+            "with planner.hand_over: rest, the plan is returned"
+        ) from error
+    seconds, longest = cell_times(motion), problem.settings.max_transition_time
+    if seconds.max() > longest:
+        raise StallError(
+            f"cell {seconds.argmax()} is refused by planner.max_transition_time: from its entry to the next "
+            f"the motion takes {seconds.max():.0f} s; expected at most {longest:.0f} s"
+        )
+    steps = zip(made.transitions, seconds.tolist(), strict=True)
+    timed = tuple(replace(step, estimated_time=time) for step, time in steps)
+    return replace(made, transitions=timed, motion=motion)
 
 
 def _slow_enough(

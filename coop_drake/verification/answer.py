@@ -98,8 +98,8 @@ def verify_plan(
     same = check_problem(plan, problem)
     exact = _exactly(problem, plan_document(plan), progress)
     checks = [same, *exact, check_gains(plan, gain_sets)]
-    kept = check_limits(plan, problem, gain_sets[plan.gain_set])
-    kept += check_motion(plan, problem, gain_sets[plan.gain_set])
+    of_motion = check_motion(plan, problem, gain_sets[plan.gain_set])  # First: it checks the times.
+    kept = check_limits(plan, problem, gain_sets[plan.gain_set]) + of_motion
     if plan.refused_by:
         return _verified_way(plan, (*checks, *_of_way(plan, problem), *kept))
     origin = None if plan.budget is None else Check("the budget is compared with no scenario", 0)
@@ -168,10 +168,10 @@ def _unproved_of_control(plan: Plan) -> str:
     """What a plan's checks leave open of whether a team stays in its cells."""
     if plan.motion is not None:
         return (
-            "that an ideal team, for which alone the motion is planned, follows it or brakes (the checks of "
-            "gains and of estimated times are about a team that rests in every cell); that motors can give "
-            "the efforts that the motion needs; that jerk is within its limit at every instant (only its "
-            "mean over each span is checked); that limits are kept while the team starts again after a stop"
+            "that an ideal team, for which alone the motion is planned, follows it or brakes (the gains of "
+            "transitions are those of a team that rests in every cell); that motors can give the efforts "
+            "that the motion needs; that jerk is within its limit at every instant (only its mean over each "
+            "span is checked); that limits are kept while the team starts again after a stop"
         )
     if plan.budget is None:
         return "that a team stays in the cells (verify the log of its run, or plan with --budget)"

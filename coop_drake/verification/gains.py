@@ -158,10 +158,15 @@ def _compare(found: TransitionGains, expected: TransitionGains, where: str) -> N
 def check_speeds(plan: Plan, problem: PlanningProblem) -> Check | None:
     """Check the limits of speed in a plan and its gains; None where neither models nor scenario state any.
 
+    The gains of a plan with a motion are without limits: it is the motion that keeps them.
+
     Raises:
         RefusalError: Names the entry, and what it should be.
     """
     limits, stated = problem.limits, plan.speeds
+    if plan.motion is not None:
+        _refuse_limited_gains(plan)
+        return None
     if not limits.any:
         gains = [transition.gains for transition in plan.transitions]
         if stated is not None or any(g.speed_limit is not None or g.rate_limit is not None for g in gains):
@@ -190,12 +195,27 @@ def check_speeds(plan: Plan, problem: PlanningProblem) -> Check | None:
     return Check("limits of speed are kept by the gains", count, least, "of one left")
 
 
+def _refuse_limited_gains(plan: Plan) -> None:
+    """Refuse what only a team that rests in every cell does to keep limits, beside a motion."""
+    stated = {"speeds": plan.speeds, "age_factor": None if plan.age_factor == 1.0 else plan.age_factor}
+    for k, transition in enumerate(plan.transitions):
+        for name in ("speed_limit", "rate_limit", "acceleration_limit"):
+            stated[f"transitions[{k}].gains.{name}"] = getattr(transition.gains, name)
+    for where, found in stated.items():
+        if found is not None:
+            raise RefusalError(
+                where, "limits a team that rests in every cell; in this plan the motion keeps limits"
+            )
+
+
 def check_accelerations(plan: Plan, problem: PlanningProblem) -> Check | None:
     """Check that no more is commanded of any joint than its limit of acceleration; None without limits.
 
     Raises:
         RefusalError: Names the entry, and what it should be.
     """
+    if plan.motion is not None:
+        return None  # Its gains have no limits, see ``check_speeds``.
     limits = problem.limits.joint_accelerations
     known, least = np.isfinite(limits), 1.0
     commanded = np.array([np.inf, *(PLANNED_SHARE * limits)])
@@ -305,13 +325,17 @@ def check_limits(plan: Plan, problem: PlanningProblem, gain_set: GainSet) -> lis
     Raises:
         RefusalError: Names the entry, and what is computed.
     """
-    again, _, accelerations = estimated(plan)
-    for k, (stated, simulated) in enumerate(zip(plan.transitions, again.transitions, strict=True)):
-        seconds = simulated.estimated_time
+    if plan.motion is None:
+        again, _, accelerations = estimated(plan)
+        times, source = np.array([one.estimated_time for one in again.transitions]), "the simulation"
+    else:
+        entries, end = plan.motion.windows[:, 0], len(plan.motion.points) - 3
+        times, source = np.append(entries[1:], end * plan.motion.period) - entries, "the motion"
+        accelerations = np.zeros((len(times), len(plan.start) - 2))  # ``check_motion`` checks those it has.
+    for k, (stated, seconds) in enumerate(zip(plan.transitions, times.tolist(), strict=True)):
         if not abs(stated.estimated_time - seconds) <= SAME_VALUE * seconds:
-            finding = f"is {stated.estimated_time} s; the simulation of this transition takes {seconds} s"
+            finding = f"is {stated.estimated_time} s; by {source}, the transition takes {seconds} s"
             raise RefusalError(f"transitions[{k}].estimated_time", finding)
-    times = np.array([one.estimated_time for one in again.transitions])
     found = _broken(plan, problem, times, accelerations)
     broken = {(worst.limit, worst.joint): (worst, values) for worst, values in found}
     for k, refusal in enumerate(plan.refused_by):
@@ -323,10 +347,11 @@ def check_limits(plan: Plan, problem: PlanningProblem, gain_set: GainSet) -> lis
         if worst.limit not in said:
             raise RefusalError("refused_by", f"does not say that the plan breaks {worst.describe()}")
     _check_age(plan, gain_set)
-    checks = [Check("times are those of a simulation of each transition", len(times))]
+    checks = [Check(f"times of all transitions are those of {source}", len(times))]
     if plan.refused_by:
         return [*checks, Check("limits of the scenario that the plan breaks", len(plan.refused_by))]
-    return [*checks, Check("clearances, times and accelerations keep the scenario's limits", len(times))]
+    kept = "clearances, times and accelerations" if plan.motion is None else "clearances and times"
+    return [*checks, Check(f"{kept} keep the scenario's limits", len(times))]
 
 
 def _check_stated(stated: Refusal, own: tuple[Refusal, FloatArray] | None, where: str) -> None:

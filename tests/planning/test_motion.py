@@ -8,8 +8,12 @@ import shapely
 from scipy.interpolate import BSpline
 
 from coop_drake.answers.motion import WAITING
+from coop_drake.laws import ScheduledGains
+from coop_drake.planning.duration import plan_time, timed
 from coop_drake.planning.motion import BRAKE_RAMP
+from coop_drake.planning.motion_barrier import Slopes, newton_step
 from coop_drake.planning.motion_limits import base_chains, base_places, follow, motion_limits
+from coop_drake.planning.transitions import share_speeds
 from coop_drake.tree.arrays import FloatArray
 from tests.support.motions import planned_motion
 
@@ -77,7 +81,8 @@ def test_all_limits_are_kept_and_used(case: Case) -> None:
 
 
 def test_it_is_quicker_than_cells_that_end_at_rest(case: Case) -> None:
-    assert case.motion.duration < 0.6 * sum(each.estimated_time for each in case.plan.transitions)
+    at_rest = share_speeds(case.problem, timed(case.plan), ScheduledGains())
+    assert case.motion.duration < 0.6 * plan_time(at_rest)
 
 
 def test_the_team_can_brake_at_any_time_before_it_leaves_the_cell_it_may_enter(case: Case) -> None:
@@ -116,11 +121,11 @@ def test_velocities_and_accelerations_are_derivatives_of_positions(case: Case) -
 
     def both(x: FloatArray, v: FloatArray, a: FloatArray, point: int) -> FloatArray:
         found = np.zeros((2, 2))
-        follow(chains, point, x, v, a, found, np.zeros((4, 2, d)))
+        follow(chains, point, x, v, a, found, np.zeros((4, 2, d)), True)
         return found
 
     for point in range(1 + 2 * len(case.bases) + d - 3):
-        size = follow(chains, point, x, v, a, moved, by)
+        size = follow(chains, point, x, v, a, moved, by, True)
         if 1 <= point <= len(case.bases):
             way = places[point - 1, :, :2]
             np.testing.assert_allclose(moved[0], (way[2] - way[0]) / 2e-4, rtol=1e-5, atol=1e-6)
@@ -134,3 +139,40 @@ def test_velocities_and_accelerations_are_derivatives_of_positions(case: Case) -
             expected = np.stack([by_x[0], by_v[0], by_x[1], by_v[1]])
             np.testing.assert_allclose(by[:, :size, k], expected[:, :size], rtol=1e-5, atol=1e-6)
             np.testing.assert_allclose(by_a[1, :size], by[1, :size, k], rtol=1e-5, atol=1e-6)
+
+
+@pytest.mark.parametrize("uniform", [False, True])
+def test_newtons_step_solves_the_system_with_all_unknowns(uniform: bool) -> None:
+    """By dense matrices, with log kappa eliminated by its dependence on the control points."""
+    random, D, m, cells = np.random.default_rng(2), 5, 40, 6
+    n, ranges = m * D, [(30 * cell, 30 * cell + 60) for cell in range(cells)]
+    whole = np.eye(n + cells)
+    for begin in range(0, n - 4 * D + 1, D):
+        inside = [k for k, (first, last) in enumerate(ranges) if first <= begin and begin + 4 * D <= last]
+        for cell in [*inside, *6 * [None]]:
+            row = np.zeros(n + cells)
+            row[begin : begin + 4 * D] = random.normal(size=4 * D)
+            if cell is not None:
+                row[n + cell] = random.normal()
+            whole += np.outer(row, row)
+    band = np.array([[whole[j, j + k] if j + k < n else 0.0 for k in range(4 * D)] for j in range(n)])
+    slope = random.normal(size=n + cells)
+    slopes = Slopes(band, slope[:n], whole[n:, :n].copy(), np.diag(whole)[n:].copy(), slope[n:])
+    fixed, lengths = np.zeros((m, D), bool), np.zeros(n)
+    fixed[:3, :-1] = fixed[-3:, :-1] = fixed[1, -1] = True
+    fixed[:, -1] |= uniform
+    if uniform:
+        lengths[D - 1 :: D] = np.arange(m) - 1.0
+    places, shares, step = np.zeros((cells, 8), np.int64), np.zeros((cells, 8)), np.empty(n)
+    for cell, (first, last) in enumerate(ranges[:-1]):
+        at = np.concatenate([first // D + np.arange(3, 7), last // D + np.arange(-3, 1)])
+        places[cell], shares[cell] = np.minimum(at, m) * D - 1, random.normal(size=8)
+    found = newton_step(slopes, places, shares, fixed.ravel(), lengths, step)
+    by_points = np.zeros((cells, n))
+    np.add.at(by_points, (np.arange(cells)[:, None], places), shares)
+    free = np.eye(n)[:, ~fixed.ravel()]
+    free = np.column_stack([free, lengths]) if uniform else free
+    all_of = np.vstack([np.eye(n), by_points]) @ free
+    expected = -np.linalg.solve(all_of.T @ whole @ all_of, all_of.T @ slope)
+    np.testing.assert_allclose(step, free @ expected, rtol=1e-6, atol=1e-6)
+    assert found == pytest.approx(float(slope @ all_of @ expected), rel=1e-6)

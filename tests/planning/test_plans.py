@@ -291,17 +291,15 @@ def test_a_long_aisle_takes_the_time_of_the_governors_speed_or_of_the_limit(limi
         goal_lower=lower, goal_upper=upper, resting=np.zeros(1),
     )  # fmt: skip
     speed = min(speed_per_clearance(gains) * 0.2, limit)
-    assert cell_selection._travel.py_func(asked, 0, 5, np.full(6, 0.2), 0.1) == pytest.approx(10.0 / speed)
+    assert cell_selection._travel.py_func(asked, 0, 5, np.full(6, 0.2)) == pytest.approx(10.0 / speed)
 
 
 def test_a_box_is_passed_at_the_pace_from_which_the_team_can_stop_in_it():
     """At the pace v, hearing of all takes the way w v, and the stop v^2 / 2, at unit limits."""
-    asked = SimpleNamespace(places=np.array([0.0, 0.2]), passing=True)
     heard, pad = cell_selection.HEARD_AFTER, 0.03
-    pace = 0.2 / cell_selection._travel.py_func(asked, 0, 1, np.full(2, 0.2), pad)
+    pace = 0.2 / cell_selection._passing_time.py_func(0.2, pad)
     assert heard * pace + 0.5 * pace**2 == pytest.approx(0.2 + 2.0 * pad)
-    asked.places = np.array([0.0, 4.0])
-    assert cell_selection._travel.py_func(asked, 0, 1, np.full(2, 0.2), pad) == pytest.approx(4.0)
+    assert cell_selection._passing_time.py_func(4.0, pad) == pytest.approx(4.0)
 
 
 def test_the_boxes_chosen_are_the_quickest_of_all_sequences(monkeypatch):
@@ -334,7 +332,7 @@ def test_the_boxes_chosen_are_the_quickest_of_all_sequences(monkeypatch):
                 waypoints.goals if j == 6 else path[j, 2:] + pads[widths[k + 1]] * np.array([[-1.0], [1.0]])
             )
             goals = np.array([np.maximum(lower, around[0]), np.minimum(upper, around[1])])
-            times = travel(waypoints, i, j, clearances, pad), closing(waypoints, i, lower, upper, goals)
+            times = travel(waypoints, i, j, clearances), closing(waypoints, i, lower, upper, goals)
             total += max(times) + cell_selection.BOX_COST / pad
         return total
 

@@ -3,7 +3,8 @@
 import json
 import re
 from dataclasses import replace
-from math import pi
+from functools import partial
+from math import inf, pi
 
 import numpy as np
 import pytest
@@ -15,12 +16,15 @@ from scipy.interpolate import BSpline
 from coop_drake import Found, save_plan
 from coop_drake import plan as make
 from coop_drake.answers import motion as defaults
+from coop_drake.answers.document import problem_digest
 from coop_drake.answers.problem import TeamLimits
 from coop_drake.errors import PlanError, RefusalError
 from coop_drake.laws import ScheduledGains
+from coop_drake.planning.duration import timed
 from coop_drake.planning.motion_limits import base_chains, base_places
 from coop_drake.plant.problem import planning_problem
 from coop_drake.verification import verify_file, verify_plan
+from coop_drake.verification.gains import check_limits, check_speeds
 from coop_drake.verification.motion import _Mover, _movers, check_motion
 from coop_drake.verification.runs.bodies import component_stages
 from tests.support.cases import team_tree
@@ -230,9 +234,9 @@ def test_a_control_point_that_leaves_its_cell_is_named(base):
     """Inside a window whose ends are left as they are, the control point is refused."""
     plan, problem = base
     motion = plan.motion
-    begin, end = (motion.windows[12] / motion.period).tolist()
-    middle = round(0.5 * (begin + end)) + 1
-    for column, by in ((0, 2.0), (1, -2.0), (2, 0.5)):
+    alone = motion.windows[1, 0] / motion.period  # Until then, only the first cell's window is open.
+    middle = round(0.5 * alone) + 1
+    for column, by in ((0, 4.0), (1, -4.0), (2, 2.0)):
         message = refused(plan, problem, **moved_points(motion, middle, column, by))
         assert message.startswith("motion.points["), message
         assert abs(int(message[14:].partition("]")[0]) - middle) <= 2
@@ -489,10 +493,36 @@ def test_a_plan_with_a_motion_is_verified_and_says_what_is_proved(base):
     assert set(names) <= {check.name for check in verified.checks}
     assert "the motion leads from start to goal" in verified.proved
     assert "that an ideal team, for which alone the motion is planned, follows it" in verified.not_proved
-    at_rest = verify_plan(replace(plan, motion=None), problem, gains)
+    unlimited = replace(problem, limits=TeamLimits())
+    at_rest = replace(timed(plan), motion=None, problem=problem_digest(unlimited))
+    at_rest = verify_plan(at_rest, unlimited, gains)
     assert at_rest.proved.endswith("in any state of the cells, which lead from start to goal")
     assert not any("motion" in check.name for check in at_rest.checks)
     assert "motion" not in at_rest.proved + at_rest.not_proved
+
+
+@pytest.mark.parametrize(
+    ("where", "change"),
+    [
+        ("transitions[3].estimated_time", {"estimated_time": 0.7}),
+        ("transitions[3].gains.speed_limit", {"speed_limit": 1.0}),
+        ("transitions[3].gains.rate_limit", {"rate_limit": np.ones(3)}),
+        ("transitions[3].gains.acceleration_limit", {"acceleration_limit": np.array([inf, 2.0, 2.0])}),
+        ("age_factor", {}),
+    ],
+)
+def test_times_are_those_of_the_motion_which_alone_keeps_limits(base, where, change):
+    plan, problem = base
+    steps = list(plan.transitions)
+    if ".gains." in where:
+        change = {"gains": replace(steps[3].gains, **change)}
+    steps[3] = replace(steps[3], **change)
+    altered = replace(plan, transitions=tuple(steps), age_factor=1.5 if where == "age_factor" else 1.0)
+    check = partial(check_limits, gain_set=GAINS) if "time" in where else check_speeds
+    with pytest.raises(RefusalError) as error:
+        check(altered, problem)
+    assert error.value.where == where
+    check(plan, problem)
 
 
 def test_a_file_with_a_motion_through_one_cell_is_verified(small, tmp_path):
