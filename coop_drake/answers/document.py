@@ -128,7 +128,9 @@ def _limits(limits: TeamLimits) -> dict[str, Any]:
     """Limits of speed and of acceleration, if there are any; efforts are not part of the question."""
     stated, document = to_plain(limits, TeamLimits), {}
     accelerations = stated.pop("joint_accelerations")
-    del stated["joint_efforts"]
+    frictions = stated.pop("frictions")
+    for name in ("joint_efforts", "base_forces", "bodies"):
+        del stated[name]
     of_motions = {name: stated.pop(name) for name in MOTION_LIMITS}
     if limits.any:
         document["limits"] = _rounded(list(stated.values()))
@@ -136,6 +138,8 @@ def _limits(limits: TeamLimits) -> dict[str, Any]:
         document["accelerations"] = _rounded(accelerations)
     if any(np.isfinite(getattr(limits, name)).any() for name in MOTION_LIMITS):
         document["motion"] = _rounded(list(of_motions.values()))
+    if np.isfinite(limits.frictions).any():
+        document["frictions"] = _rounded(frictions)
     return document
 
 

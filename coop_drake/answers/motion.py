@@ -16,6 +16,9 @@ FEWEST_POINTS = 7
 BASE_SPEED, TURN_RATE, BASE_ACCELERATION, TURN_ACCELERATION, BASE_JERK = 1.0, 1.5, 1.0, 2.0, 10.0
 """Limits of bases of which nothing is known [m/s, rad/s, m/s^2, rad/s^2, m/s^3]."""
 
+FRICTION, GRAVITY = 0.5, 9.81
+"""Largest force of a base over the weight of what it moves, where nothing is known [-]; and g [m/s^2]."""
+
 JOINT_RATE, JOINT_ACCELERATION, OBJECT_ACCELERATION = 1.0, 2.0, 1.5
 """Limits of joints and of the object of which nothing is known [rad/s, rad/s^2; m/s, m/s^2; m/s^2]."""
 

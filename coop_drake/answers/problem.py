@@ -7,7 +7,7 @@ import numpy as np
 from shapely import Polygon
 
 from coop_drake.tree.arrays import FloatArray
-from coop_drake.tree.component_tree import Component, ComponentTree
+from coop_drake.tree.component_tree import Bodies, Component, ComponentTree
 from coop_drake.typed_data import Bounds, Limits, NotNegative, Positive
 
 
@@ -32,6 +32,9 @@ class TeamLimits:
         turn_accelerations: Largest acceleration of the bases' angles, shape (N,) [rad/s^2].
         base_jerks: Largest jerk of the bases' origins, shape (N,) [m/s^3].
         object_acceleration: Largest acceleration of the object's origin, of shape (1,) [m/s^2].
+        frictions: Largest force of every base over the weight of what it moves, shape (N,) [-].
+        base_forces: Largest force of every base by its drives, shape (N,) [N].
+        bodies: What every base moves: base, arm and its share of the load; empty where that is not known.
     """
 
     base_components: tuple[int, ...] = ()
@@ -45,6 +48,9 @@ class TeamLimits:
     turn_accelerations: Bounds = field(default_factory=_none)
     base_jerks: Bounds = field(default_factory=_none)
     object_acceleration: Bounds = field(default_factory=_none)
+    frictions: Bounds = field(default_factory=_none)
+    base_forces: Bounds = field(default_factory=_none)
+    bodies: Bodies = ()
 
     @property
     def any(self) -> bool:

@@ -28,6 +28,10 @@ _ROWS = (
     ("smallest clearance between bodies", "{min_body_clearance_m:.4f} m"),
     ("peak speed of the object", "{peak_speed_m_s:.2f} m/s"),
     ("peak base force", "{peak_base_wrench_n:.1f} N"),
+    (
+        "nearest to a limit of force",
+        "base of {force_of}, {force_n:.1f} N, limit {force_limit_n:.1f} by {force_by}",
+    ),
     ("nearest to a limit of speed", "{nearest_to_a_limit}"),
     ("error at the end", "{final_position_error_m:.4f} m, {final_angle_error_rad:.4f} rad"),
     ("used of the plan's budget", "{budget_used:.0%}: {budget_used_by} at {budget_used_at:.2f} s"),
@@ -203,6 +207,24 @@ def beyond_budget(facts: Mapping[str, Any]) -> str:
     ).format_map(facts)
 
 
+def _force_facts(log: SimulationLog, problem: PlanningProblem) -> dict[str, Any]:
+    """Return which base came nearest to its limit of force, and what sets this limit."""
+    import numpy as np
+
+    from coop_drake.planning.motion_limits import largest_forces
+
+    most, limits = largest_forces(problem.limits), problem.limits
+    peaks = np.hypot(log.base_wrenches[..., 0], log.base_wrenches[..., 1]).max(axis=0)
+    k = int(np.argmax(peaks / most))
+    by_drives = bool(most[k] == limits.base_forces[k])
+    return {
+        "force_of": log.robot_names[k],
+        "force_n": float(peaks[k]),
+        "force_limit_n": float(most[k]),
+        "force_by": "deployment.actuators.base_force" if by_drives else "limits.friction",
+    }
+
+
 def simulation_facts(plan: Plan, log: SimulationLog, problem: PlanningProblem) -> dict[str, Any]:
     """Return how the run went: errors at its end, smallest margins and peaks over all accepted steps."""
     import numpy as np
@@ -212,6 +234,7 @@ def simulation_facts(plan: Plan, log: SimulationLog, problem: PlanningProblem) -
 
     x, y, theta = log.object_pose[-1] - plan.goal_pose
     near_stops, slow_seconds = steadiness(log)
+    of_force = {} if plan.motion is None else _force_facts(log, problem)
     base_forces = np.hypot(log.base_wrenches[..., 0], log.base_wrenches[..., 1])
     return {
         "outcome": "arrived" if log.reached and not log.violation else "failed",
@@ -235,6 +258,7 @@ def simulation_facts(plan: Plan, log: SimulationLog, problem: PlanningProblem) -
         "max_governor_spread_m": float(log.governor_spread.max()),
         "messages": communication(log).messages,
         "peak_base_wrench_n": float(base_forces.max()),
+        **of_force,
         "peak_base_force_rate_n_s": log.peak_force_rate,
         "peak_base_torque_nm": float(np.abs(log.base_wrenches[..., 2]).max()),
         "peak_joint_torque_nm": float(np.abs(log.joint_torques).max(initial=0.0)),

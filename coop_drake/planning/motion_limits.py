@@ -1,4 +1,8 @@
-"""What moves with a configuration: the object, the bases, their angles and the joints; and their limits."""
+"""What moves with a configuration: object, bases, joints, and centres of mass; and their limits.
+
+A base gives the force that accelerates itself, its arm and its share of the load. Divided by their mass it is
+the acceleration of their common centre of mass, a sum of turned arms as the position of a base is.
+"""
 
 from __future__ import annotations
 
@@ -11,6 +15,8 @@ from coop_drake.answers.motion import (
     BASE_ACCELERATION,
     BASE_JERK,
     BASE_SPEED,
+    FRICTION,
+    GRAVITY,
     JOINT_ACCELERATION,
     JOINT_RATE,
     OBJECT_ACCELERATION,
@@ -21,21 +27,25 @@ from coop_drake.answers.problem import PlanningProblem, TeamLimits
 from coop_drake.jit import compiled
 from coop_drake.laws.motion import motion_at
 from coop_drake.tree.arrays import FloatArray, IntArray
-from coop_drake.tree.component_tree import ComponentTree
+from coop_drake.tree.component_tree import Bodies, ComponentTree
 
 
 class Chains(NamedTuple):
-    """Where the bases are: p_B = p + sum over links of R(phi_k) (c_k + q_k d_k), phi_k linear in the axes.
+    """Where points are: p_B = p + sum over links of R(phi_k) (c_k + q_k d_k), phi_k linear in the axes.
+
+    They are the bases, then the centres of mass of what each base moves, where masses are known.
 
     Attributes:
-        turns: What a unit of every axis (theta, q...) adds to phi_k, shape (bases, links, 1 + n) [-].
-        offsets: phi_k where all axes are zero, shape (bases, links) [rad].
-        arms: c_k, shape (bases, links, 2) [m].
-        slides: Which axis slides the arm, -1 for none, shape (bases, links).
-        directions: d_k, shape (bases, links, 2) [-].
-        links: Number of links of every base, shape (bases,).
+        bases: Number of bases.
+        turns: What a unit of every axis (theta, q...) adds to phi_k, shape (points, links, 1 + n) [-].
+        offsets: phi_k where all axes are zero, shape (points, links) [rad].
+        arms: c_k, shape (points, links, 2) [m].
+        slides: Which axis slides the arm, -1 for none, shape (points, links).
+        directions: d_k, shape (points, links, 2) [-].
+        links: Number of links of every point, shape (points,).
     """
 
+    bases: int
     turns: FloatArray
     offsets: FloatArray
     arms: FloatArray
@@ -45,7 +55,7 @@ class Chains(NamedTuple):
 
 
 def motion_limits(limits: TeamLimits) -> FloatArray:
-    """Return the largest velocity, acceleration and jerk of object, bases, bases' angles and joints, (P, 3).
+    """Return the largest velocity, acceleration and jerk of what ``follow`` knows, shape (P, 3).
 
     Args:
         limits: What models and scenario state; where they state nothing, those of ``answers/motion`` count.
@@ -62,9 +72,32 @@ def motion_limits(limits: TeamLimits) -> FloatArray:
         (robots, (limits.turn_rates, TURN_RATE), (limits.turn_accelerations, TURN_ACCELERATION), None),
         (joints, (limits.joint_rates, JOINT_RATE), (limits.joint_accelerations, JOINT_ACCELERATION), None),
     ]
-    return np.concatenate(
-        [np.column_stack([_known(count, kind) for kind in kinds]) for count, *kinds in rows]
-    )
+    found = [np.column_stack([_known(count, kind) for kind in kinds]) for count, *kinds in rows]
+    forces = largest_forces(limits)
+    none = np.full(len(forces), inf)
+    return np.concatenate([*found, np.column_stack([none, forces / _masses(limits), none])])
+
+
+def largest_forces(limits: TeamLimits) -> FloatArray:
+    """Return the largest force of every base: by friction, or by its drives if that is less, (N,) [N].
+
+    Empty where masses are not known.
+    """
+    masses = _masses(limits)
+    by_friction = GRAVITY * masses * _known(len(masses), (limits.frictions, FRICTION))
+    return np.minimum(by_friction, _known(len(masses), (limits.base_forces, inf)))
+
+
+def _masses(limits: TeamLimits) -> FloatArray:
+    """Return the mass that every base moves, empty where it is not known, shape (N,) [kg]."""
+    moved = _moved(limits.bodies, len(limits.base_components))
+    return np.array([sum(mass for _, mass, *_ in bodies) for bodies in moved])
+
+
+def _moved(bodies: Bodies, robots: int) -> list[list[tuple[float, ...]]]:
+    """Return what each robot's base moves, none where nothing is known."""
+    found = [[body for body in bodies if body[5] == robot] for robot in range(robots)]
+    return found if all(found) else []
 
 
 def _known(count: int, limit: tuple[FloatArray, float] | None) -> FloatArray:
@@ -75,46 +108,62 @@ def _known(count: int, limit: tuple[FloatArray, float] | None) -> FloatArray:
     return np.where(np.isfinite(stated), stated, otherwise) if stated.size else np.full(count, otherwise)
 
 
-def base_chains(tree: ComponentTree, bases: list[tuple[int, tuple[float, float]]]) -> Chains:
-    """Return where points of components are, such as the bases' origins.
+_Link = tuple[FloatArray, float, FloatArray, int, FloatArray]
+
+
+def base_chains(
+    tree: ComponentTree, bases: list[tuple[int, tuple[float, float]]], bodies: Bodies = ()
+) -> Chains:
+    """Return where points of components are: the bases' origins, and the centres of mass of what bases move.
 
     Args:
         tree: The team.
         bases: A component, and a point in its frame [m], for each base.
+        bodies: What the bases move.
     """
-    axes, found = 1 + len(tree.joints), []
-    for component, point in bases:
-        turn, offset, links = np.zeros(axes), 0.0, []
-        turn[0] = 1.0
-        for index in reversed(tree.ancestors[component][:-1]):
-            joint = tree.components[index].joint
-            assert joint is not None  # as in every component but the object's
-            arm = np.array([joint.X_PJ.x, joint.X_PJ.y])
-            links.append((turn.copy(), offset, arm, -1, np.zeros(2)))
-            offset += joint.X_PJ.angle
-            if joint.kind == "revolute":
-                turn[1 + joint.index] += joint.sign
-            else:
-                links.append((turn.copy(), offset, np.zeros(2), 1 + joint.index, np.array(joint.axis)))
-        links.append((turn.copy(), offset, np.array(point), -1, np.zeros(2)))
-        found.append(links)
+    axes, found = 1 + len(tree.joints), [_links(tree, *base) for base in bases]
+    for moved in _moved(bodies, len(bases)):
+        whole, summed = sum(mass for _, mass, *_ in moved), dict[tuple[float, ...], _Link]()
+        for component, mass, x, y, *_ in moved:
+            for turn, offset, arm, slide, direction in _links(tree, int(component), (x, y)):
+                key, share = (*turn.tolist(), offset, slide), mass / whole
+                old = summed.get(key, (turn, offset, np.zeros(2), slide, np.zeros(2)))
+                summed[key] = (turn, offset, old[2] + share * arm, slide, old[4] + share * direction)
+        found.append(list(summed.values()))
     count = max((len(links) for links in found), default=1)
     chains = Chains(
-        np.zeros((len(found), count, axes)), np.zeros((len(found), count)), np.zeros((len(found), count, 2)),
-        np.full((len(found), count), -1), np.zeros((len(found), count, 2)),
+        len(bases), np.zeros((len(found), count, axes)), np.zeros((len(found), count)),
+        np.zeros((len(found), count, 2)), np.full((len(found), count), -1), np.zeros((len(found), count, 2)),
         np.array([len(links) for links in found]),
     )  # fmt: skip
-    for base, links in enumerate(found):
+    for point, links in enumerate(found):
         for k, (turn, offset, arm, slide, direction) in enumerate(links):
-            chains.turns[base, k], chains.offsets[base, k], chains.arms[base, k] = turn, offset, arm
-            chains.slides[base, k], chains.directions[base, k] = slide, direction
+            chains.turns[point, k], chains.offsets[point, k], chains.arms[point, k] = turn, offset, arm
+            chains.slides[point, k], chains.directions[point, k] = slide, direction
     return chains
 
 
+def _links(tree: ComponentTree, component: int, point: tuple[float, float]) -> list[_Link]:
+    """Return phi (by the axes, and where they are zero), c, the sliding axis and d of a point's links."""
+    turn, offset, links = np.zeros(1 + len(tree.joints)), 0.0, []
+    turn[0] = 1.0
+    for index in reversed(tree.ancestors[component][:-1]):
+        joint = tree.components[index].joint
+        assert joint is not None  # as in every component but the object's
+        arm = np.array([joint.X_PJ.x, joint.X_PJ.y])
+        links.append((turn.copy(), offset, arm, -1, np.zeros(2)))
+        offset += joint.X_PJ.angle
+        if joint.kind == "revolute":
+            turn[1 + joint.index] += joint.sign
+        else:
+            links.append((turn.copy(), offset, np.zeros(2), 1 + joint.index, np.array(joint.axis)))
+    return [*links, (turn.copy(), offset, np.array(point), -1, np.zeros(2))]
+
+
 def team_chains(problem: PlanningProblem) -> Chains:
-    """Return where the bases' origins are."""
+    """Return where the bases' origins and the centres of mass of what bases move are."""
     of = problem.limits
-    return base_chains(problem.tree, list(zip(of.base_components, of.base_points, strict=True)))
+    return base_chains(problem.tree, list(zip(of.base_components, of.base_points, strict=True)), of.bodies)
 
 
 def base_places(chains: Chains, motion: FloatArray) -> FloatArray:
@@ -124,8 +173,8 @@ def base_places(chains: Chains, motion: FloatArray) -> FloatArray:
         chains: The bases.
         motion: Configurations, shape (samples, 3 + n).
     """
-    found, axes = np.zeros((len(chains.links), len(motion), 3)), motion[:, 2:]
-    for base, links in enumerate(chains.links):
+    found, axes = np.zeros((chains.bases, len(motion), 3)), motion[:, 2:]
+    for base, links in enumerate(chains.links[: chains.bases]):
         found[base, :, :2] = motion[:, :2]
         for k in range(links):
             angle = chains.offsets[base, k] + axes @ chains.turns[base, k]
@@ -149,11 +198,12 @@ def times_at_limits(chains: Chains, limits: FloatArray, points: FloatArray) -> F
     """
     bases, steps = np.diff(base_places(chains, points), axis=1), np.diff(points, axis=0)
     moved = [np.hypot(bases[..., 0], bases[..., 1]), np.abs(bases[..., 2]), np.abs(steps[:, 3:].T)]
-    seconds: FloatArray = (np.concatenate(moved) / limits[1:, :1]).max(axis=0)
+    shares = np.concatenate(moved)
+    seconds: FloatArray = (shares / limits[1 : 1 + len(shares), :1]).max(axis=0)
     return seconds
 
 
-# What moves: the object (point 0), the bases, their angles, and the joints, with derivatives.
+# What moves, with derivatives.
 
 
 @compiled(borrows=True)
@@ -165,7 +215,8 @@ def follow(
 
     Args:
         chains: The bases.
-        point: 0 for the object, then the bases, the bases' angles and the joints.
+        point: 0 for the object, then the bases, their angles, the joints, and the centres of mass of what
+            bases move.
         x: z, shape (3 + n,).
         v: z'.
         a: z''.
@@ -176,16 +227,18 @@ def follow(
     Returns:
         Of how many numbers V and A consist.
     """
-    bases, d = chains.links.size, x.size
+    bases, d, chain = chains.bases, x.size, point - 1
     for i in range(4 if derive else 0):
         for j in range(2):
             for k in range(d):
                 by[i, j, k] = 0.0
-    if point > 2 * bases:
+    if point > 2 * bases + d - 3:
+        chain -= bases + d - 3
+    elif point > 2 * bases:
         axis = point - 2 * bases + 2
         moved[0, 0], moved[1, 0], by[1, 0, axis] = v[axis], a[axis], 1.0
         return 1
-    if point > bases:
+    elif point > bases:
         base = point - bases - 1
         last = chains.links[base] - 1
         moved[0, 0] = moved[1, 0] = 0.0
@@ -199,19 +252,18 @@ def follow(
         moved[0, i], moved[1, i], by[1, i, i] = v[i], a[i], 1.0
     if point == 0:
         return 2
-    base = point - 1
-    for link in range(chains.links[base]):
-        phi, w, turning = chains.offsets[base, link], 0.0, 0.0
+    for link in range(chains.links[chain]):
+        phi, w, turning = chains.offsets[chain, link], 0.0, 0.0
         for k in range(2, d):
-            turn = chains.turns[base, link, k - 2]
+            turn = chains.turns[chain, link, k - 2]
             phi += turn * x[k]
             w += turn * v[k]
             turning += turn * a[k]
-        c, s, slide = cos(phi), sin(phi), chains.slides[base, link] + 2
-        dx, dy = chains.directions[base, link, 0], chains.directions[base, link, 1]
+        c, s, slide = cos(phi), sin(phi), chains.slides[chain, link] + 2
+        dx, dy = chains.directions[chain, link, 0], chains.directions[chain, link, 1]
         dx, dy = c * dx - s * dy, s * dx + c * dy
         length, rate, push = (x[slide], v[slide], a[slide]) if slide >= 2 else (0.0, 0.0, 0.0)
-        ax, ay = chains.arms[base, link, 0], chains.arms[base, link, 1]
+        ax, ay = chains.arms[chain, link, 0], chains.arms[chain, link, 1]
         ux, uy = c * ax - s * ay + length * dx, s * ax + c * ay + length * dy
         # The arm u, its direction d of sliding, and both turned by a right angle: (-uy, ux), (-dy, dx).
         moved[0, 0] += -w * uy + rate * dx
@@ -219,7 +271,7 @@ def follow(
         moved[1, 0] += -turning * uy - w * w * ux - 2.0 * w * rate * dy + push * dx
         moved[1, 1] += turning * ux - w * w * uy + 2.0 * w * rate * dx + push * dy
         for k in range(2, d if derive else 0):
-            turn = chains.turns[base, link, k - 2]
+            turn = chains.turns[chain, link, k - 2]
             if turn != 0.0:
                 by[0, 0, k] += turn * (-w * ux - rate * dy)
                 by[0, 1, k] += turn * (-w * uy + rate * dx)

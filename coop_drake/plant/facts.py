@@ -147,9 +147,9 @@ def run_setup(scenario: Scenario) -> RunSetup:
     )
 
 
-def moved_bodies(scenario: Scenario, team: TeamPlant) -> Bodies:
+def moved_bodies(scenario: Scenario, team: TeamPlant, tree: ComponentTree | None = None) -> Bodies:
     """Return the bodies that robots move, robot by robot: its own, and its share of the object's masses."""
-    masses, moved = team_masses(team, read_component_tree(team)), []
+    masses, moved = team_masses(team, tree or read_component_tree(team)), []
     for k, robot in enumerate(team.robots):
         load = scenario.load_share(robot.name, len(team.robots))
         shares = [(body, {k: 1.0, None: load}.get(body.robot, 0.0)) for body in masses]

@@ -19,6 +19,7 @@ from coop_drake.answers.problem import PlanningProblem, TeamLimits, object_radiu
 from coop_drake.errors import ScenarioError
 from coop_drake.plant.chain import limits_of
 from coop_drake.plant.component_tree import base_points, read_component_tree
+from coop_drake.plant.facts import moved_bodies
 from coop_drake.plant.parsing import refusal
 from coop_drake.plant.team import RobotModel, TeamPlant, build_team_plant
 from coop_drake.scenario import Scenario, assemble
@@ -225,6 +226,8 @@ def _stated_limits(scenario: Scenario, joints: Mapping[str, int], limits: TeamLi
         base_accelerations=_of_bases(scenario, joints, "base_acceleration"),
         turn_accelerations=_of_bases(scenario, joints, "base_turn_acceleration"),
         base_jerks=_of_bases(scenario, joints, "base_jerk"),
+        frictions=_of_bases(scenario, joints, "friction"),
+        base_forces=np.full(len(joints), scenario.deployment.actuators.base_force or inf),
         object_acceleration=np.array([inf if of_object is None else of_object]),
     )
 
@@ -341,6 +344,7 @@ def planning_problem(scenario: Scenario, team: TeamPlant | None = None) -> Plann
     check_joints(scenario, team)
     joints = {robot.name: len(robot.joints) for robot in team.robots}
     tree = read_component_tree(team)
-    problem = stated_problem(scenario, tree, joints, read_limits(team, tree))
+    limits = replace(read_limits(team, tree), bodies=moved_bodies(scenario, team, tree))
+    problem = stated_problem(scenario, tree, joints, limits)
     check_places(scenario, problem)
     return problem

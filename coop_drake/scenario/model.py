@@ -239,6 +239,8 @@ class RobotLimits:
             speeds of bases are 1 m/s and 1.5 rad/s, unknown limits of joints 1 rad/s and 2 rad/s^2.
         base_turn_acceleration: Largest acceleration of the base's angle [rad/s^2].
         base_jerk: Largest jerk of the base's frame [m/s^3].
+        friction: Largest force of the base over the weight of base, arm and its share of the load, used as
+            these; null means 0.5 [-].
         acceleration: Largest acceleration of the object, in the entry ``object`` alone, used as these; null
             means 1.5 m/s^2 [m/s^2].
     """
@@ -250,6 +252,7 @@ class RobotLimits:
     base_acceleration: Positive | None = None
     base_turn_acceleration: Positive | None = None
     base_jerk: Positive | None = None
+    friction: Positive | None = None
     acceleration: Positive | None = None
 
 

@@ -308,10 +308,10 @@ class _Mover(NamedTuple):
         unit: m or rad.
         speed: Its largest velocity.
         acceleration: Its largest acceleration.
-        axes: Its velocity is this times z', shape (1 or 2, 3 + n); None for the origin of a base.
+        axes: Its velocity is this times z', shape (1 or 2, 3 + n); None for a sum of points.
         jerk: Largest mean jerk over a span.
-        stages: What moves the component of a base, its own joint first.
-        point: The base's origin in that component [m].
+        points: Points of components, each with its share in the sum [-], what moves its component, its own
+            joint first, and its place in that component [m]. One of share 1 is the origin of a base.
     """
 
     name: str
@@ -320,15 +320,15 @@ class _Mover(NamedTuple):
     acceleration: float
     axes: FloatArray | None
     jerk: float = inf
-    stages: Stages = ()
-    point: tuple[float, float] = (0.0, 0.0)
+    points: tuple[tuple[float, Stages, tuple[float, float]], ...] = ()
 
     def rates(self, z: FloatArray, v: FloatArray, a: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return V and A by z, z' and z'' of shape (P, 3 + n); shape (P, 1 or 2)."""
         if self.axes is not None:
             return v @ self.axes.T, a @ self.axes.T
-        found = moved(np.array(self.point), self.stages, z, v, a)
-        return found.velocity, found.acceleration
+        found = [(share, moved(np.array(point), stages, z, v, a)) for share, stages, point in self.points]
+        velocity: FloatArray = np.sum([share * each.velocity for share, each in found], axis=0)
+        return velocity, np.sum([share * each.acceleration for share, each in found], axis=0)
 
     def curving(
         self, z: FloatArray, v: FloatArray, a: FloatArray, j: FloatArray
@@ -341,21 +341,24 @@ class _Mover(NamedTuple):
         """
         if self.axes is not None:
             return np.linalg.norm(j @ np.abs(self.axes).T, axis=1), np.zeros(len(j))
-        x0 = np.full(len(z), hypot(*self.point))
-        x1 = x2 = x3 = x4 = np.zeros(len(z))
-        for stage in self.stages:
-            q, w, w1, w2 = (values[:, 3 + stage.index] for values in (z, v, a, j))
-            if stage.kind == "prismatic":
-                along = hypot(*stage.axis)
-                x0, x1, x2, x3 = x0 + along * q, x1 + along * w, x2 + along * w1, x3 + along * w2
-            else:
-                second, third = w1 + w**2, w2 + 3.0 * w * w1 + w**3
-                fourth = 3.0 * w1**2 + 4.0 * w * w2 + 6.0 * w**2 * w1 + w**4
-                x4 = x4 + 4.0 * w * x3 + 6.0 * second * x2 + 4.0 * third * x1 + fourth * x0
-                x3 = x3 + 3.0 * w * x2 + 3.0 * second * x1 + third * x0
-                x2, x1 = x2 + 2.0 * w * x1 + second * x0, x1 + w * x0
-            x0 = x0 + hypot(stage.X_PJ.x, stage.X_PJ.y)
-        return x3 + np.hypot(j[:, 0], j[:, 1]), x4
+        third, fourth = np.zeros(len(z)), np.zeros(len(z))
+        for share, stages, point in self.points:
+            x0 = np.full(len(z), hypot(*point))
+            x1 = x2 = x3 = x4 = np.zeros(len(z))
+            for stage in stages:
+                q, w, w1, w2 = (values[:, 3 + stage.index] for values in (z, v, a, j))
+                if stage.kind == "prismatic":
+                    along = hypot(*stage.axis)
+                    x0, x1, x2, x3 = x0 + along * q, x1 + along * w, x2 + along * w1, x3 + along * w2
+                else:
+                    second, cubic = w1 + w**2, w2 + 3.0 * w * w1 + w**3
+                    quartic = 3.0 * w1**2 + 4.0 * w * w2 + 6.0 * w**2 * w1 + w**4
+                    x4 = x4 + 4.0 * w * x3 + 6.0 * second * x2 + 4.0 * cubic * x1 + quartic * x0
+                    x3 = x3 + 3.0 * w * x2 + 3.0 * second * x1 + cubic * x0
+                    x2, x1 = x2 + 2.0 * w * x1 + second * x0, x1 + w * x0
+                x0 = x0 + hypot(stage.X_PJ.x, stage.X_PJ.y)
+            third, fourth = third + share * (x3 + np.hypot(j[:, 0], j[:, 1])), fourth + share * x4
+        return third, fourth
 
 
 def _movers(problem: PlanningProblem) -> Iterator[_Mover]:
@@ -373,7 +376,10 @@ def _movers(problem: PlanningProblem) -> Iterator[_Mover]:
         speed = known(of.base_speeds, k, defaults.BASE_SPEED)
         most = known(of.base_accelerations, k, defaults.BASE_ACCELERATION)
         jerk = known(of.base_jerks, k, defaults.BASE_JERK)
-        yield _Mover(f"base {k}", "m", speed, most, None, jerk, stages, point)
+        yield _Mover(f"base {k}", "m", speed, most, None, jerk, ((1.0, stages, point),))
+        yield from _centre(
+            problem, k, known(of.frictions, k, defaults.FRICTION), known(of.base_forces, k, inf)
+        )
         speed = known(of.turn_rates, k, defaults.TURN_RATE)
         most = known(of.turn_accelerations, k, defaults.TURN_ACCELERATION)
         signs = [stage.sign * unit[3 + stage.index] for stage in stages if stage.kind == "revolute"]
@@ -382,6 +388,17 @@ def _movers(problem: PlanningProblem) -> Iterator[_Mover]:
         speed = known(of.joint_rates, joint.index, defaults.JOINT_RATE)
         most = known(of.joint_accelerations, joint.index, defaults.JOINT_ACCELERATION)
         yield _Mover(joint.name, joint.unit, speed, most, unit[[3 + joint.index]])
+
+
+def _centre(problem: PlanningProblem, k: int, friction: float, force: float) -> Iterator[_Mover]:
+    """Yield the common centre of all masses that a base moves: the force over their sum accelerates it."""
+    held = [body for body in problem.limits.bodies if body[5] == k]
+    if mass := sum(one for _, one, *_ in held):
+        points = tuple(
+            (one / mass, component_stages(problem.tree, int(on)), (x, y)) for on, one, x, y, *_ in held
+        )
+        most = min(friction * defaults.GRAVITY, force / mass)
+        yield _Mover(f"the centre of all that base {k} moves", "m", inf, most, None, points=points)
 
 
 def _check_limits(motion: Motion, windows: FloatArray, problem: PlanningProblem) -> list[Check]:

@@ -13,10 +13,12 @@ from coop_drake import load_scenario
 from coop_drake.answers.log import SimulationLog
 from coop_drake.answers.plan import Plan
 from coop_drake.answers.problem import PlanningProblem
+from coop_drake.cli.summary import simulation_facts
 from coop_drake.diagram import RobotKnowledge
 from coop_drake.diagram.robot_controller import team_schedule
 from coop_drake.errors import RefusalError, ScenarioError
 from coop_drake.laws.words import ASKS
+from coop_drake.planning.motion_limits import largest_forces
 from coop_drake.plant.facts import run_setup
 from coop_drake.scenario import (
     ActuatorLimits,
@@ -34,6 +36,7 @@ from coop_drake.scenario.checks import validate
 from coop_drake.scenario.model import RobotLimits
 from coop_drake.simulation import build_maps, simulate
 from coop_drake.systems.words import SAID, RobotWords
+from coop_drake.verification.motion import _movers
 from coop_drake.verification.runs.motion import check_followed
 from coop_drake.verification.runs.rows import Rows
 from coop_drake.verification.runs.verify_log import verify_log
@@ -61,6 +64,31 @@ def test_the_team_arrives_when_the_motion_says_and_follows_it(transport: Transpo
     nominal = spline(log.phases[:, 1, 0])
     # The integrator's error: ten times what is seen.
     np.testing.assert_allclose(np.hstack([log.object_pose, log.joints]), nominal, rtol=0, atol=1e-4)
+
+
+def test_forces_of_bases_are_what_accelerates_all_that_they_move(transport: Transport) -> None:
+    """At full pace: the mass that a base moves times the acceleration of its centre along the motion."""
+    _, problem, plan, log = transport
+    motion, limits = plan.motion, problem.limits
+    assert motion is not None
+    spline = BSpline(motion.period * (np.arange(len(motion.points) + 4) - 3.0), motion.points, 3)
+    phases = log.phases[log.phases[:, 1, 1] == 1.0, 1, 0]
+    rates = [spline.derivative(order)(phases) if order else spline(phases) for order in range(3)]
+    found = log.base_wrenches[log.phases[:, 1, 1] == 1.0, :, :2]
+    centres = [mover for mover in _movers(problem) if mover.name.startswith("the centre")]
+    for k, centre in enumerate(centres):
+        mass = sum(mass for _, mass, *_, robot in limits.bodies if robot == k)
+        force = mass * np.linalg.norm(centre.rates(*rates)[1], axis=1)
+        np.testing.assert_allclose(np.linalg.norm(found[:, k], axis=1), force, atol=0.05)
+        assert force.max() > 5.0
+    facts = simulation_facts(plan, log, problem)
+    most = largest_forces(limits)
+    np.testing.assert_allclose(most, [0.5 * 9.81 * 8.5] * 2)
+    assert facts["force_n"] == pytest.approx(np.linalg.norm(log.base_wrenches[..., :2], axis=2).max())
+    assert (facts["force_by"], facts["force_limit_n"]) == ("limits.friction", most[0])
+    drives = replace(problem, limits=replace(limits, base_forces=np.array([30.0, 50.0])))
+    found = simulation_facts(plan, log, drives)
+    assert (found["force_of"], found["force_by"]) == ("robot_0", "deployment.actuators.base_force")
 
 
 def test_it_never_stops_between_start_and_goal(transport: Transport) -> None:

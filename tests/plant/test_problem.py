@@ -186,6 +186,8 @@ def test_a_negative_limit_of_urdf_is_refused_before_drake_ends_the_process(tmp_p
     ("said", "key", "allowed"),
     [
         ("{robot_0: {base_speed: 0}}", "limits.robot_0.base_speed", "a positive number"),
+        ("{'*': {friction: 0}}", "limits.*.friction", "a positive number"),
+        ("{robot_1: {friction: -0.5}}", "limits.robot_1.friction", "a positive number"),
         ("{robot_0: {base_speed: .nan}}", "limits.robot_0.base_speed", "a finite number"),
         ("{robot_0: {joint_rates: [-1]}}", "limits.robot_0.joint_rates[0]", "a positive number"),
         ("{'*': {joint_accelerations: [0]}}", "limits.*.joint_accelerations[0]", "a positive number"),

@@ -21,6 +21,7 @@ from coop_drake.answers.problem import TeamLimits
 from coop_drake.errors import PlanError, RefusalError
 from coop_drake.laws import ScheduledGains
 from coop_drake.planning.duration import timed
+from coop_drake.planning.motion import quickest_motion
 from coop_drake.planning.motion_limits import base_chains, base_places
 from coop_drake.plant.problem import planning_problem
 from coop_drake.verification import verify_file, verify_plan
@@ -296,6 +297,7 @@ LARGEST = {
     "base_speeds": 1.0, "turn_rates": 1.0, "joint_rates": 1.0, "joint_accelerations": 2.0,
     "base_accelerations": defaults.BASE_ACCELERATION, "turn_accelerations": defaults.TURN_ACCELERATION,
     "base_jerks": defaults.BASE_JERK, "object_acceleration": defaults.OBJECT_ACCELERATION,
+    "frictions": defaults.FRICTION, "base_forces": 40.0,
 }  # fmt: skip
 
 
@@ -317,7 +319,7 @@ def test_every_limit_counts_as_the_problem_states_it(base, name):
             low = middle
         else:
             high = middle
-    assert high > 0.3 * LARGEST[name]
+    assert high > {"frictions": 0.15, "base_forces": 0.15}.get(name, 0.3) * LARGEST[name]
     points, angles = places(problem, spline(plan.motion)(np.linspace(0.0, plan.motion.duration, 20001)))
     robots = len(points) - 1
     of = {"base_speeds": points[1:], "turn_rates": angles[:robots], "joint_rates": angles[robots:]}.get(name)
@@ -326,13 +328,25 @@ def test_every_limit_counts_as_the_problem_states_it(base, name):
         assert high == pytest.approx(moved_by * 20000 / plan.motion.duration, rel=2e-3)
 
 
+def test_a_motion_within_little_friction_is_slower_and_keeps_it(base):
+    plan, problem = base
+    slippery = with_limit(problem, "frictions", 0.06)
+    motion = quickest_motion(plan, slippery, GAINS.age)
+    assert motion.duration > 1.05 * plan.motion.duration
+    checks = check_motion(replace(plan, motion=motion), slippery, GAINS)
+    assert 0.0 <= min(check.tightest for check in checks if check.unit.startswith("least share")) < 0.01
+    with pytest.raises(RefusalError, match=r"the centre of all that base \d moves is accelerated by"):
+        check_motion(replace(plan, motion=motion), with_limit(problem, "frictions", 0.055), GAINS)
+
+
 @pytest.mark.parametrize("unknown", [np.empty(0), np.full(2, np.inf)])
 def test_limits_that_nobody_states_are_those_by_default(base, unknown):
     _, problem = base
     names = [name for name in LARGEST if name != "object_acceleration"]
     of = replace(problem.limits, **dict.fromkeys(names, unknown), object_acceleration=unknown[:1])
     found = [(one.speed, one.acceleration, one.jerk) for one in _movers(replace(problem, limits=of))]
-    bases, joints = [(1.0, 1.0, 10.0), (1.5, 2.0, np.inf)] * 2, [(1.0, 2.0, np.inf)] * 2
+    by_friction = (np.inf, 0.5 * 9.81, np.inf)
+    bases, joints = [(1.0, 1.0, 10.0), by_friction, (1.5, 2.0, np.inf)] * 2, [(1.0, 2.0, np.inf)] * 2
     assert found == [(np.inf, 1.5, np.inf), *bases, *joints]
 
 
@@ -393,7 +407,8 @@ def test_what_curves_velocities_and_accelerations_is_bounded(tree, seed):
     """By differences of the accelerations of cubic motions, at many times in a step."""
     random, axes = np.random.default_rng(seed), 3 + len(tree.joints)
     component, point = int(random.integers(len(tree.components))), tuple(random.normal(size=2))
-    mover = _Mover("base", "m", 1.0, 1.0, None, np.inf, component_stages(tree, component), point)
+    points = (0.7, component_stages(tree, component), point), (0.3, component_stages(tree, 0), (0.2, 0.1))
+    mover = _Mover("base", "m", 1.0, 1.0, None, np.inf, points)
     c = random.normal(size=(4, axes)) * random.choice([0.1, 1.0, 3.0], size=(4, 1))
     e, t = 1e-3, np.linspace(0.0, 0.1, 50)
 
@@ -410,7 +425,8 @@ def test_what_curves_velocities_and_accelerations_is_bounded(tree, seed):
 
 
 def test_the_bound_is_what_a_turn_at_a_constant_rate_has():
-    mover = _Mover("base", "m", 1.0, 1.0, None, np.inf, component_stages(team_tree(1, 1), 0), (0.6, 0.8))
+    points = ((1.0, component_stages(team_tree(1, 1), 0), (0.6, 0.8)),)
+    mover = _Mover("base", "m", 1.0, 1.0, None, np.inf, points)
     still, rate = np.zeros((1, 4)), np.array([[0.0, 0.0, 2.0, 0.0]])
     of_v, of_a = mover.curving(still, rate, still, still)
     assert (of_v[0], of_a[0]) == (8.0, 16.0)  # w^3 r and w^4 r
