@@ -33,8 +33,8 @@ _LIMIT = 30.0
 _CODED = 1000
 _REPEATS = 5
 
-_SAMPLE = Sample(1, 0.005, True, False, 0, 0.0, 0.0, (1.0, 2.0, 0.5), tuple(0.1 * i for i in range(10)))
-_EFFORT = Effort(1, 0.0, 0, 0, (1.0, 2.0, 3.0, 4.0, 5.0), ())
+_SAMPLE = Sample(1, 0.005, True, False, (0, 0), 0.0, 0.0, (1.0, 2.0, 0.5), tuple(0.1 * i for i in range(10)))
+_EFFORT = Effort(1, 0.0, (0, 0), 0, (1.0, 2.0, 3.0, 4.0, 5.0), ())
 """What a robot with two joints is sent at every sample, and what it answers."""
 
 

@@ -142,7 +142,7 @@ class Link:
     ) -> None:
         self._faults: ChannelFaults = getattr(faults, channel)
         self._words = [faults.seed, _CHANNELS.index(channel), sender, receiver]
-        self._robot = sender if sender < messages.SUPERVISOR else receiver
+        self._robots = {sender, receiver}
         self._period, self._count = period, 0
         self.late_by = max(1, whole_periods(self._faults.late_by, period))
 
@@ -165,4 +165,4 @@ class Link:
 
     def _covers(self, gap: Gap, sample: int) -> bool:
         first, last = (round(t / self._period) for t in (gap.begin, gap.begin + gap.duration))
-        return first <= sample < last and (not gap.robots or self._robot in gap.robots)
+        return first <= sample < last and (not gap.robots or bool(self._robots & {*gap.robots}))

@@ -11,7 +11,7 @@ from typing import Annotated, Any, Literal, Union
 from msgspec import DecodeError, Meta, Struct
 from msgspec.msgpack import Decoder, Encoder
 
-PROTOCOL = 5
+PROTOCOL = 6
 """Version of the protocol; grows when a message of the same fields would mean something else."""
 
 WORLD, SUPERVISOR = 255, 254
@@ -99,8 +99,8 @@ class Sample(Message, frozen=True):
         time: What the robot's clock shows at the sample.
         step: Whether the robot computes an effort; if not, it only shows what it would log.
         stopped: Whether the line of the emergency stop is open, so that all drives brake.
-        team_messages: How many messages of the supervisor in their session the robot must have before it
-            answers.
+        team_messages: How many messages of each robot, then of the supervisor, in their sessions the robot
+            must have before it answers; 0 for itself.
         pose_stamp: When the pose was measured, in the world's time; not when it was sent.
         state_stamp: When the state was measured, likewise.
         object_pose: Pose (x, y, angle) of the object's frame L in W, the angle in any turn.
@@ -112,7 +112,7 @@ class Sample(Message, frozen=True):
     time: Seconds
     step: bool
     stopped: bool
-    team_messages: Number
+    team_messages: Numbers
     pose_stamp: Seconds
     state_stamp: Seconds
     object_pose: Pose
@@ -143,7 +143,8 @@ class Effort(Message, frozen=True):
     Attributes:
         number: Number of the sample that it was computed from.
         stamp: The older of the stamps of the measurements that it rests on.
-        team_messages: How many messages this robot has sent to the supervisor in this session.
+        team_messages: How many messages this robot has sent to each robot, then to the supervisor, in their
+            sessions.
         state: 0: the robot follows the plan; 1: it holds; 2: its drives brake, and it waits to begin its cell
             anew; 3: it does not know the current cell; 4: it rests where it cannot begin its cell anew; 5: it
             returns slowly to its cell, on a way that no plan has proved free; 6: its measurements are older
@@ -155,7 +156,7 @@ class Effort(Message, frozen=True):
 
     number: Number
     stamp: Seconds
-    team_messages: Number
+    team_messages: Numbers
     state: Small
     efforts: Efforts
     rest: Coordinates
@@ -175,7 +176,7 @@ class Telemetry(Message, frozen=True):
 
     number: Number
     time: Seconds
-    team_messages: Number
+    team_messages: Numbers
     state: Small
     refused: Number
     values: Values
@@ -189,8 +190,8 @@ class Status(Message, frozen=True):
         time: As in the question.
         knows: Whether it knows the current cell; a supervisor that was started again does not at first.
         team_messages: How many messages it has sent to each robot in their session.
-        cell: Index of the current cell.
-        entry: Time at which this cell was entered.
+        cell: Index of the current cell; 0 where the team passes, and each robot is in a cell of its own.
+        entry: Time at which this cell was entered; likewise.
         arrived: Whether all robots have said that they have arrived in the last cell.
         causes: Why the team is held, by an order (1), then for each robot: 0: no cause; 2: it asks; 3: it is
             not heard; 4: its drives shall brake. Empty where neither the scenario has holds nor the plan a
@@ -310,6 +311,19 @@ class Begin(Message, frozen=True):
     object_pose: Pose
 
 
+class Word(Message, frozen=True):
+    """What a robot or the supervisor of a team that passes says to all others in every period.
+
+    Attributes:
+        rows: Those of the last samples, the newest first, so many as may be under way. Each has the numbers
+            of the start and of the plan, when it was said by the own clock [s], what its sender does, the
+            cell that it has begun, where the team shall brake, where it rests, when it starts [s], and
+            whether it has an alarm, see ``coop_drake/laws/words.py``.
+    """
+
+    rows: Values
+
+
 Received = tuple[int, int, Any]
 """Session, number and message, as they stand in the bytes of a message."""
 
@@ -318,8 +332,9 @@ KINDS: dict[tuple[str, str], tuple[type[Message], ...]] = {
     ("world", "supervisor"): (Tick, Goodbye),
     ("robot", "world"): (Effort, Telemetry),
     ("supervisor", "world"): (Status,),
-    ("robot", "supervisor"): (Ready, HoldRequest, Place, AtRest),
-    ("supervisor", "robot"): (Switch, Hold, Begin),
+    ("robot", "supervisor"): (Ready, HoldRequest, Place, AtRest, Word),
+    ("supervisor", "robot"): (Switch, Hold, Begin, Word),
+    ("robot", "robot"): (Word,),
 }
 """Messages from one kind of process to another, beside those that open a session."""
 

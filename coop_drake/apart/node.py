@@ -77,11 +77,12 @@ class SampledDiagram:
 
     Args:
         diagram: All its discrete updates have one period and no offset.
+        decides: Whether blocks in it decide before all others update, by unrestricted updates.
     """
 
-    def __init__(self, diagram: Diagram) -> None:
-        self.diagram = diagram
-        self.context = diagram.CreateDefaultContext()
+    def __init__(self, diagram: Diagram, *, decides: bool = False) -> None:
+        self.diagram, self.context = diagram, diagram.CreateDefaultContext()
+        self._decided = diagram.CreateDefaultContext() if decides else None
         self._inputs: dict[str, FloatArray] = {}
 
     def at(self, time: float, inputs: Mapping[str, FloatArray]) -> None:
@@ -95,7 +96,13 @@ class SampledDiagram:
                 self._inputs[name] = value.copy()
 
     def update(self) -> None:
-        """Carry out the discrete updates of one sample."""
+        """Carry out the updates of one sample."""
+        if self._decided is not None:
+            self._decided.SetDiscreteState(self.context.get_discrete_state())
+            self.diagram.CalcForcedUnrestrictedUpdate(self.context, self._decided.get_mutable_state())
+            self.context.SetDiscreteState(self._decided.get_discrete_state())
+        if self.diagram.GetUniquePeriodicDiscreteUpdateAttribute() is None:
+            return
         self.context.SetDiscreteState(self.diagram.EvalUniquePeriodicDiscreteUpdate(self.context))
 
     def output(self, name: str) -> FloatArray:
@@ -104,7 +111,7 @@ class SampledDiagram:
 
     def release(self) -> None:
         """Free all memory; the Diagram may not be used any more."""
-        del self.context
+        del self.context, self._decided
         release_all(self.diagram)
 
 

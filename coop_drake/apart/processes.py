@@ -25,6 +25,7 @@ from coop_drake.apart.faults import NO_FAULTS, Faults
 from coop_drake.apart.membership import TOLERATED, Processes
 from coop_drake.apart.messages import SUPERVISOR, WORLD, Goodbye, name_of
 from coop_drake.apart.node import NodeProcess
+from coop_drake.apart.passing import PassingRobot, PassingSupervisor
 from coop_drake.apart.robot import RobotNode, RobotProcess, certified_age
 from coop_drake.apart.supervisor import SupervisorNode, SupervisorProcess
 from coop_drake.apart.team_files import AddressBook, KeyPair, local_book
@@ -32,7 +33,8 @@ from coop_drake.apart.transport import Ends, Network
 from coop_drake.apart.world import Pacing, SampleExchange
 from coop_drake.diagram import brakes_of, build_world, control_period
 from coop_drake.diagram.closed_loop import build_station
-from coop_drake.diagram.robot_controller import hold_of, robot_knowledge
+from coop_drake.diagram.deployment import radio_of
+from coop_drake.diagram.robot_controller import hold_of, robot_knowledge, team_schedule
 from coop_drake.errors import CoopDrakeError
 from coop_drake.harmonic_maps import HarmonicMap
 from coop_drake.interrupts import uninterrupted
@@ -72,7 +74,8 @@ def network_of(
         ScenarioError: Robots do not compute at common samples.
     """
     period, known = control_period(scenario), book or local_book(robots_of(scenario))
-    return Network(known, scenario_digest(scenario), plan_digest(plan), keys, faults, period)
+    passes = plan.motion is not None
+    return Network(known, scenario_digest(scenario), plan_digest(plan), keys, faults, period, passes)
 
 
 def robots_of(scenario: Scenario) -> int:
@@ -102,26 +105,38 @@ def run_node(
     Raises:
         MessagingError: The others cannot be reached, or fall silent.
     """
-    node: RobotNode | SupervisorNode
+    node: RobotNode | SupervisorNode | PassingSupervisor
+    robots = len(network.book.robots)
     if index == SUPERVISOR:
-        robots = len(network.book.robots)
-        node = SupervisorNode(robots, len(plan.cells), network.period, hold_of(scenario, plan))
+        node = _supervisor(scenario, plan, robots, network.period)
     else:
         team = build_station(scenario).team
         known = robot_knowledge(scenario, plan, maps, team)[index]
-        node = RobotNode(known, scenario.deployment, index, team.robots[index].name)
+        robot = RobotNode if known.schedule is None else PassingRobot
+        node = robot(known, scenario.deployment, index, team.robots[index].name)
     ends = Ends(network, index)
     try:
         ends.open(_OPENING)
         process: NodeProcess = (
-            SupervisorProcess(node, ends, robots)
-            if isinstance(node, SupervisorNode)
-            else RobotProcess(node, ends)
+            RobotProcess(node, ends, robots)
+            if isinstance(node, RobotNode)
+            else SupervisorProcess(node, ends, robots)
         )
         return process.run(wanted)
     finally:
         ends.close()
         node.release()
+
+
+def _supervisor(
+    scenario: Scenario, plan: Plan, robots: int, period: float
+) -> SupervisorNode | PassingSupervisor:
+    """Return the supervisor of a team of N robots."""
+    schedule = team_schedule(scenario, plan)
+    if schedule is None:
+        return SupervisorNode(robots, len(plan.cells), period, hold_of(scenario, plan))
+    names = [robot.name for robot in build_team_plant(scenario, DiagramBuilder()).robots]
+    return PassingSupervisor(schedule, radio_of(scenario.deployment, names, robots), scenario.control.hold)
 
 
 class _FreshProcess(subprocess.Popen[bytes]):
@@ -179,7 +194,8 @@ class LocalTeam(Processes):
     ) -> None:
         self._problem, self._network = (scenario, plan, maps), network
         self.processes = dict[int, BaseProcess | _FreshProcess]()
-        self._left = dict.fromkeys((SUPERVISOR, *range(len(network.book.robots))), restarts)
+        robots = range(len(network.book.robots))  # None of them takes up a motion on its way.
+        self._left = {SUPERVISOR: restarts, **dict.fromkeys(robots, 0 if network.passes else restarts)}
 
     def __enter__(self) -> LocalTeam:
         for index in self._left:

@@ -32,8 +32,8 @@ from coop_drake.systems import axis_laws, robot_record
 from coop_drake.tree.arrays import FloatArray
 from coop_drake.tree.component_tree import whole_turns
 
-Said = list[msg.Ready | msg.HoldRequest | msg.AtRest]
-"""What a robot tells the supervisor."""
+Said = list[msg.Ready | msg.HoldRequest | msg.AtRest | msg.Word]
+"""What a robot tells the supervisor, or words, which it tells all others."""
 
 
 ROOM = 0.01
@@ -150,7 +150,10 @@ class RobotNode:
     def __init__(self, knowledge: RobotKnowledge, deployment: Deployment, robot: int, name: str) -> None:
         controller = build_robot_controller(knowledge)
         self._deployed = deploy(controller, deployment, robot, name, bodiless=True)
-        self._controller, self._sampled = controller, nodes.SampledDiagram(self._deployed.diagram)
+        self._controller, self._sampled = (
+            controller,
+            nodes.SampledDiagram(self._deployed.diagram, decides=knowledge.schedule is not None),
+        )
         self.period, self._held = knowledge.period or 0.0, knowledge.hold is not None
         self._monitored = knowledge.monitored is not None
         self._joints = knowledge.joints.stop - knowledge.joints.start
@@ -158,7 +161,8 @@ class RobotNode:
         self._axes = np.array([0, *range(1 + knowledge.joints.start, 1 + knowledge.joints.stop)])
         self._tables = [law.table for law in axis_laws(knowledge.plan, self._axes.tolist())]
         self._knowledge, self._plan, self._chain = knowledge, knowledge.plan, robot_chain(knowledge.robot)
-        record = robot_record(self._joints, holds=self._held, monitored=self._monitored)
+        passes = knowledge.schedule is not None
+        record = robot_record(self._joints, holds=self._held, monitored=self._monitored, passes=passes)
         self._logged = [name for name, size in record.items() if size]
         self._cell, self._hold_message = np.zeros(2), np.zeros(2)
         self._said, self._reported, self._told_rest = msg.Ready(0, False), inf, -inf
@@ -246,13 +250,18 @@ class RobotNode:
         doubts = stamps is not None and self._stamps.doubts(self._number, time, stamps)
         time = self.instant(time, self._number)
         self._doubted = self._doubted + 1 if doubts else 0
-        longest = whole_periods(LONGEST_DOUBT, self.period) if self._held else 0
+        held = self._held or self._plan.motion is not None
+        longest = whole_periods(LONGEST_DOUBT, self.period) if held else 0
         if self._doubted > longest and self.place.known:
             self.state, self._slow, self._order = nodes.LATE, None, None
             return np.zeros(3 + self._joints), []
         measured = self._unwrapped(measured)
         if self.place.known and np.isfinite(measured).all():
             self._near = np.clip(measured[self._circles], *self._turns[self.place.cell])
+        return self._act(time, measured, stopped=stopped)
+
+    def _act(self, time: float, measured: FloatArray, *, stopped: bool) -> tuple[FloatArray, Said]:
+        """Compute a sample by what the robot measures, in turns that go on from each other."""
         if not self._moves(time, measured, stopped=stopped):
             return np.zeros(3 + self._joints), self._stand(measured) if self.place.known else []
         if self._slow is not None and not self._has_come(self._slow, time):
@@ -264,6 +273,11 @@ class RobotNode:
         self.state = nodes.STANDS if brakes else nodes.HOLDS if held else nodes.FOLLOWS
         self.rest = self._rest()
         return self._sampled.output("robot_effort"), self._messages()
+
+    def hear_from(self, sender: int, message: Any) -> None:
+        """Take in what somebody says, by its index in messages; it counts from the next instant on."""
+        if sender == msg.SUPERVISOR:
+            self.hear([message])
 
     def hear(self, messages: Iterable[Any]) -> None:
         """Take in what the supervisor says; it counts from the next instant on."""
@@ -473,10 +487,12 @@ class RobotProcess(nodes.NodeProcess):
     Args:
         node: The robot.
         ends: Its sockets, with sessions.
+        robots: Number of robots.
     """
 
-    def __init__(self, node: RobotNode, ends: Ends) -> None:
-        super().__init__(ends, [msg.SUPERVISOR])
+    def __init__(self, node: RobotNode, ends: Ends, robots: int) -> None:
+        self._everyone = [*range(robots), msg.SUPERVISOR]
+        super().__init__(ends, [index for index in self._everyone if index in ends.sessions])
         self._node, self._team = node, ends.sessions[msg.SUPERVISOR]
         self._placed, self._placing = 0, -inf
         self._stepped: int | None = None
@@ -485,6 +501,8 @@ class RobotProcess(nodes.NodeProcess):
     def _objection(self, question: msg.Sample) -> str:
         if len(question.object_pose) != 3 or len(question.robot_state) != self._node.state_size:
             return f"Expected 3 numbers of the object and {self._node.state_size} of the robot"
+        if len(question.team_messages) != len(self._everyone):
+            return f"Expected {len(self._everyone)} numbers of messages"
         missed = 0 if self._stepped is None else question.number - self._stepped
         return (
             ""
@@ -493,12 +511,17 @@ class RobotProcess(nodes.NodeProcess):
         )
 
     def _counts(self, question: msg.Sample) -> Mapping[int, int]:
-        return {msg.SUPERVISOR: question.team_messages}
+        told = dict(zip(self._everyone, question.team_messages, strict=True))
+        return {index: told[index] for index in self._mail}
+
+    def _sent(self) -> tuple[int, ...]:
+        """Return how many messages each robot, then the supervisor, take of this one."""
+        return tuple(self._ends.sent(index) if index in self._mail else 0 for index in self._everyone)
 
     def _hear(self, sender: int, message: Any) -> None:
         if isinstance(message, msg.Switch):
             self._placed = self._team.count
-        self._node.hear([message])
+        self._node.hear_from(sender, message)
 
     def _begin(self, question: msg.Sample) -> None:
         if question.number == 0:
@@ -524,12 +547,13 @@ class RobotProcess(nodes.NodeProcess):
         if question.step:
             effort, said = self._steps(question, measured)
             for message in said:
-                ends.send(msg.SUPERVISOR, message)
+                for index in self._mail if isinstance(message, msg.Word) else [msg.SUPERVISOR]:
+                    ends.send(index, message)
             rest = () if node.rest is None else tuple(node.rest.tolist())
-            stamp, sent = min(question.pose_stamp, question.state_stamp), ends.sent(msg.SUPERVISOR)
+            stamp, sent = min(question.pose_stamp, question.state_stamp), self._sent()
             ends.send(msg.WORLD, msg.Effort(number, stamp, sent, node.state, tuple(effort.tolist()), rest))
         # What the log shows comes last: then the world knows that there is no effort if none has come.
-        sent, refused = ends.sent(msg.SUPERVISOR), ends.refusals.total
+        sent, refused = self._sent(), ends.refusals.total
         ends.send(msg.WORLD, msg.Telemetry(number, time, sent, node.state, refused, shown))
         ends.release()
 

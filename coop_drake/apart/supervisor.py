@@ -10,6 +10,7 @@ from pydrake.systems.framework import DiagramBuilder
 
 from coop_drake.apart import messages as msg
 from coop_drake.apart.node import AHEAD, LOSSY_COPIES, NodeProcess, SampledDiagram
+from coop_drake.apart.passing import PassingSupervisor
 from coop_drake.apart.transport import Ends
 from coop_drake.diagram.closed_loop import add_supervisor
 from coop_drake.laws.measurements import period_of, whole_periods
@@ -185,7 +186,7 @@ class SupervisorProcess(NodeProcess):
         robots: Number of robots.
     """
 
-    def __init__(self, node: SupervisorNode, ends: Ends, robots: int) -> None:
+    def __init__(self, node: SupervisorNode | PassingSupervisor, ends: Ends, robots: int) -> None:
         super().__init__(ends, range(robots))
         self._node, self._robots = node, range(robots)
 

@@ -105,13 +105,15 @@ class Listener:
 
 @dataclass(frozen=True)
 class RobotEntry:
-    """A robot; it listens nowhere.
+    """A robot.
 
     Attributes:
         key: Its public key.
+        address: Where it listens to the robots before it, which only those of a team that passes do.
     """
 
     key: str | None = None
+    address: str | None = None
 
 
 @dataclass(frozen=True)
@@ -137,9 +139,13 @@ class AddressBook:
             raise DataError("robots", len(self.robots), f"a list of 1 to {MOST_ROBOTS}")
         listeners = {"world": self.world, "supervisor": self.supervisor}
         addresses = {f"{name}.address": one.address for name, one in listeners.items()}
+        for k, entry in enumerate(self.robots):
+            if entry.address is not None:
+                addresses[f"robots[{k}].address"] = entry.address
         outside = [name for name, address in addresses.items() if not _host(name, address).is_loopback]
-        if self.world.address == self.supervisor.address:
-            raise DataError("supervisor.address", self.supervisor.address, "an address of its own")
+        for i, (name, address) in enumerate(addresses.items()):
+            if address in [*addresses.values()][:i]:
+                raise DataError(name, address, "an address of its own")
         robots = {f"robots[{k}]": robot for k, robot in enumerate(self.robots)}
         keys = {f"{name}.key": one.key for name, one in (listeners | robots).items()}
         for name, key in keys.items():
@@ -155,9 +161,22 @@ class AddressBook:
         if len(set(known)) < len(known):
             raise DataError("key", max(known, key=known.count), "a key of its own for each process")
 
-    def listener(self, index: int) -> Listener:
-        """Return the world or the supervisor by its index in messages."""
-        return self.world if index == WORLD else self.supervisor
+    def address_of(self, index: int) -> str:
+        """Return where a process listens, by its index in messages.
+
+        Raises:
+            ScenarioError: The book does not say.
+        """
+        address = self._entry(index).address
+        if address is None:
+            allowed = (
+                "an address such as tcp://127.0.0.1:7002: robots of a team that passes speak to each other"
+            )
+            raise ScenarioError("the address book", f"robots[{index}].address", None, allowed)
+        return address
+
+    def _entry(self, index: int) -> Listener | RobotEntry:
+        return {WORLD: self.world, SUPERVISOR: self.supervisor}.get(index) or self.robots[index]
 
     @property
     def secured(self) -> bool:
@@ -166,7 +185,7 @@ class AddressBook:
 
     def key_of(self, index: int) -> str | None:
         """Return the public key of a process by its index in messages."""
-        return (self.listener(index) if index in (WORLD, SUPERVISOR) else self.robots[index]).key
+        return self._entry(index).key
 
 
 def _host(name: str, address: str) -> IPv4Address:
@@ -214,7 +233,7 @@ def local_book(robots: int, keys: dict[int, KeyPair] | None = None) -> AddressBo
         keys: Keys of all processes by their index in messages, None for none.
     """
     with ExitStack() as stack:
-        sockets = [stack.enter_context(socket.socket()) for _ in range(2)]
+        sockets = [stack.enter_context(socket.socket()) for _ in range(2 + robots)]
         for each in sockets:
             each.bind(("127.0.0.1", 0))
         addresses = [f"tcp://127.0.0.1:{each.getsockname()[1]}" for each in sockets]
@@ -222,10 +241,11 @@ def local_book(robots: int, keys: dict[int, KeyPair] | None = None) -> AddressBo
 
 
 def _book(addresses: Sequence[str], robots: int, keys: Mapping[int, KeyPair]) -> AddressBook:
-    """Return the book of a team by the addresses of the world and the supervisor, and the keys of all."""
+    """Return the book by the addresses of world, supervisor and maybe robots, and the keys of all."""
     public = {index: pair.public for index, pair in keys.items()}
     world, supervisor = (Listener(addresses[i], public.get(k)) for i, k in enumerate((WORLD, SUPERVISOR)))
-    return AddressBook(world, supervisor, tuple(RobotEntry(public.get(k)) for k in range(robots)))
+    own = [*addresses[2:], *[None] * robots]
+    return AddressBook(world, supervisor, tuple(RobotEntry(public.get(k), own[k]) for k in range(robots)))
 
 
 def key_file(index: int) -> str:
@@ -240,7 +260,8 @@ def make_team_files(folder: Path, robots: int, hosts: tuple[str, str], port: int
         folder: A new or an empty folder.
         robots: Number of robots.
         hosts: Addresses of the machines of the world and of the supervisor.
-        port: Where the world listens; the supervisor listens at the next one.
+        port: Where the world listens; the supervisor listens at the next one, and where all are on this
+            machine robots at those after it.
 
     Returns:
         The address book, then the private keys.
@@ -254,7 +275,9 @@ def make_team_files(folder: Path, robots: int, hosts: tuple[str, str], port: int
         raise DataError("--robots", robots, f"a whole number from 1 to {MOST_ROBOTS}")
     keys = {index: make_keys() for index in (WORLD, SUPERVISOR, *range(robots))}
     try:
-        book = _book([f"tcp://{host}:{port + k}" for k, host in enumerate(hosts)], robots, keys)
+        alone = set(hosts) == {"127.0.0.1"}
+        listening = [*hosts, *(hosts[:1] * robots if alone else ())]
+        book = _book([f"tcp://{host}:{port + k}" for k, host in enumerate(listening)], robots, keys)
     except DataError as error:
         option = "--supervisor and --port" if error.key == "supervisor.address" else "--world and --port"
         raise DataError(option, error.value, error.allowed) from error

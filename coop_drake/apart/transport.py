@@ -54,6 +54,10 @@ class Network:
         keys: The process' own keys, None where the book has none.
         faults: What goes wrong with messages that the process sends, and with robots' clocks.
         period: Control period [s].
+        passes: Whether the team passes from cell to cell, so that robots speak to each other, too.
+
+    Raises:
+        ScenarioError: Robots shall speak to each other, and the book does not say where they listen.
     """
 
     book: AddressBook
@@ -62,6 +66,19 @@ class Network:
     keys: KeyPair | None = None
     faults: Faults = NO_FAULTS
     period: float = 1.0
+    passes: bool = False
+
+    def __post_init__(self) -> None:
+        for k in range(1, len(self.book.robots) if self.passes else 0):
+            self.book.address_of(k)
+
+    def partners(self, index: int) -> list[int]:
+        """Return all with whom a process speaks."""
+        robots = [*range(len(self.book.robots))]
+        others = [*robots, messages.SUPERVISOR, messages.WORLD]
+        if index < messages.SUPERVISOR and not self.passes:
+            others = others[-2:]
+        return [other for other in others if other != index]
 
     def link(self, sender: int, receiver: int) -> Link | None:
         """Return what goes wrong with messages from one process to another, None for nothing."""
@@ -217,7 +234,7 @@ class Server(_Socket):
 
     Args:
         network: What the process needs to speak with its team.
-        index: Its own index; the world listens to all others, the supervisor to robots.
+        index: Its own index; it listens to those with smaller ones.
         refusals: Counts what is refused.
 
     Raises:
@@ -230,7 +247,7 @@ class Server(_Socket):
     def __init__(self, network: Network, index: int, refusals: messages.Refusals) -> None:
         super().__init__(network.keys, refusals, zmq.ROUTER)
         self._network, self._index, book = network, index, network.book
-        clients = [*range(len(book.robots)), *([messages.SUPERVISOR] if index == messages.WORLD else [])]
+        clients = [other for other in network.partners(index) if other < index]
         self.sessions = {k: Session(partial(self._to, k), network.link(index, k)) for k in clients}
         self._connected, self._routes = dict[bytes, int](), dict[int, bytes]()
         self._socket.setsockopt(zmq.ROUTER_MANDATORY, 1)
@@ -243,7 +260,7 @@ class Server(_Socket):
             self._keeper.start()
             known = _KnownKeys(map(book.key_of, clients))
             self._keeper.configure_curve_callback("team", credentials_provider=known)
-        address = book.listener(index).address
+        address = book.address_of(index)
         try:
             self._socket.bind(address)
         except zmq.ZMQError as error:
@@ -374,7 +391,7 @@ class Client(_Socket):
     def __init__(self, network: Network, index: int, server: int, refusals: messages.Refusals) -> None:
         connections = zmq.Event.HANDSHAKE_SUCCEEDED | zmq.Event.DISCONNECTED
         super().__init__(network.keys, refusals, zmq.DEALER, connections)
-        self.address, self.trouble = network.book.listener(server).address, "nothing answers there"
+        self.address, self.trouble = network.book.address_of(server), "nothing answers there"
         self.session = Session(lambda data: self._put((data,)), network.link(index, server))
         self._server, self._decoder = server, messages.decoder_of(server, index)
         self._hello = messages.Hello(messages.PROTOCOL, index, network.scenario, network.plan)
@@ -462,14 +479,11 @@ class Ends:
             deque[Received](),
             messages.Refusals(messages.name_of(index)),
         )
-        self.clients = {
-            k: Client(network, index, k, self.refusals)
-            for k in (messages.WORLD, messages.SUPERVISOR)
-            if k > index
-        }
+        partners, self._awaits_all = network.partners(index), index == messages.WORLD or network.passes
+        self.clients = {k: Client(network, index, k, self.refusals) for k in partners if k > index}
         self.sessions = {k: client.session for k, client in self.clients.items()}
         self._all: list[Server | Client] = [*self.clients.values()]
-        if index in (messages.WORLD, messages.SUPERVISOR):
+        if min(partners) < index:
             self._all.append(server := Server(network, index, self.refusals))
             self.sessions |= server.sessions
         self._poller, self._owners = zmq.Poller(), dict[Any, Server | Client]()
@@ -512,7 +526,7 @@ class Ends:
         return {index: session.release(self.sample) for index, session in self.sessions.items()}
 
     def open(self, limit: float, ended: Callable[[], Collection[int]] = tuple) -> None:
-        """Wait for sessions with all servers, or where this is the world with all others.
+        """Wait for sessions with all servers, or with all others where this is the world or the team passes.
 
         Messages that arrive meanwhile are kept for :meth:`receive`.
 
@@ -539,14 +553,14 @@ class Ends:
             end.close()
 
     def _missing(self) -> str:
-        """Say with whom there are no sessions yet: servers, or where this is the world all others."""
-        missing = [
-            (messages.name_of(k), k) for k in sorted((self.clients or self.sessions).keys() - self.present())
+        """Say with whom there are no sessions yet of those that ``open`` waits for."""
+        away = (self.sessions if self._awaits_all else self.clients).keys() - self.present()
+        words = [
+            f"{messages.name_of(k)} at {self.clients[k].address}: {self.clients[k].trouble}"
+            for k in sorted(away & self.clients.keys())
         ]
-        if not self.clients:
-            return "no message came from " + ", ".join(name for name, _ in missing) if missing else ""
-        known = self.clients
-        return "; ".join(f"{name} at {known[k].address}: {known[k].trouble}" for name, k in missing)
+        silent = ", ".join(messages.name_of(k) for k in sorted(away - self.clients.keys()))
+        return "; ".join([*words, *([f"no message came from {silent}"] if silent else [])])
 
     def _poll(self, seconds: float) -> None:
         """Wait until something comes, then take one message of every end, so that none waits for another."""

@@ -138,8 +138,13 @@ class SampleExchange:
         self._everyone, self._period = [*range(len(network.book.robots)), messages.SUPERVISOR], network.period
         self.report, self._every = report, max(1, round(_REPORTED / network.period))
         self._clock, self._oldest = network.faults.clock, oldest + _ROUNDING
+        self._passes = network.passes
         self.membership = Membership(
-            tolerated=tolerated, rejoin=rejoin, processes=processes or Processes(), tell=tell
+            tolerated=tolerated,
+            rejoin=rejoin,
+            processes=processes or Processes(),
+            tell=tell,
+            again=not network.passes,
         )
         self.missing, self.brakes = self.membership.missing, list[Brake]()
         self.sample, self._still = 0, Stillness(network.period)
@@ -211,7 +216,8 @@ class SampleExchange:
             raise MessagingError(self.trouble())
         status = self._last[messages.SUPERVISOR, messages.Status]
         shown = [self._last[k, messages.Telemetry].values for k in self._everyone[:-1]]
-        return np.concatenate([*shown, [status.cell, status.entry, status.arrived, *status.causes]])
+        cell = [] if self._passes else [status.cell, status.entry]
+        return np.concatenate([*shown, [*cell, status.arrived, *status.causes]])
 
     def _take_sample(
         self, time: float, measured: Sequence[FloatArray], stamps: Sequence[FloatArray] | None
@@ -303,18 +309,24 @@ class SampleExchange:
         """Return what a process is asked at an instant."""
         head = self.sample, self._clock(index, time), step, self.membership.stopped
         if index == messages.SUPERVISOR:
-            return messages.Tick(*head, tuple(self._counts.get(k, 0) for k in self._everyone[:-1]))
-        told, own = self._counts.get(messages.SUPERVISOR), measured[index]
-        heard, (placed, moved) = told[index] if told else 0, self._stamps[index].tolist()
+            return messages.Tick(*head, self._told(-1)[:-1])
+        own, heard, (placed, moved) = measured[index], self._told(index), self._stamps[index].tolist()
         pose, state = tuple(own[-3:].tolist()), tuple(own[:-3].tolist())
         return messages.Sample(*head, heard, placed, moved, pose, state)
 
+    def _told(self, index: int) -> tuple[int, ...]:
+        """Return how many messages each robot, then the supervisor, have sent to the one of an index."""
+        nothing = [0] * len(self._everyone)
+        return tuple(self._counts.get(k, nothing)[index] for k in self._everyone)
+
     def _fits(self, sender: int, message: messages.Effort | messages.Telemetry | messages.Status) -> bool:
         """Whether the lists of an answer are as long as they must be, and its state and its cell exist."""
+        robots = len(self._sizes)
         if isinstance(message, messages.Status):
-            robots = len(self._sizes)
             fitting = len(message.team_messages) == robots and len(message.causes) in (0, 1 + robots)
             return fitting and message.cell < self._cells
+        if len(message.team_messages) != robots + 1:
+            return False
         if isinstance(message, messages.Effort):
             size = self._sizes[sender]
             fitting = len(message.efforts) == size and len(message.rest) in (0, size)

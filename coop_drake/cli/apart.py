@@ -106,7 +106,7 @@ def keys_command(
         ),
     ] = None,
     port: Annotated[
-        int, typer.Option("--port", metavar="P", help="First of two ports that processes listen on.")
+        int, typer.Option("--port", metavar="P", help="First of the ports that processes listen on.")
     ] = _FIRST_PORT,
     out: Annotated[Path, out_folder("A new folder for the files.")] = Path("keys"),
 ) -> None:

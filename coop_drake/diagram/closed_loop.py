@@ -376,9 +376,14 @@ def _add_network(builder: DiagramBuilder, speakers: Sequence[System], hold: Hold
     for i, one in enumerate(speakers):
         builder.Connect(one.GetOutputPort("said"), network.get_input_port(i))
         builder.Connect(network.get_output_port(), one.GetInputPort("words"))
+    add_order(builder, hold, speakers[-1])
+
+
+def add_order(builder: DiagramBuilder, hold: Hold | None, supervisor: System) -> None:
+    """Tell the supervisor when the scenario holds the team, if it does."""
     if hold is not None:
         order = builder.AddNamedSystem("hold_order", _order(hold))
-        builder.Connect(order.get_output_port(0), speakers[-1].GetInputPort("order"))
+        builder.Connect(order.get_output_port(0), supervisor.GetInputPort("order"))
 
 
 def add_supervisor(
@@ -396,8 +401,7 @@ def add_supervisor(
     supervisor = builder.AddNamedSystem(
         "hold_supervisor", HoldSupervisor(robots, silence=hold.silence, period=period)
     )
-    order = builder.AddNamedSystem("hold_order", _order(hold))
-    builder.Connect(order.get_output_port(0), supervisor.GetInputPort("order"))
+    add_order(builder, hold, supervisor)
     builder.Connect(supervisor.GetOutputPort("paused"), planner.GetInputPort("paused"))
     return supervisor
 

@@ -61,8 +61,6 @@ def control_period(scenario: Scenario) -> float:
         ScenarioError: Robots compute in continuous time, or not all at the same time.
     """
     deployment, period = scenario.deployment, scenario.deployment.period
-    if scenario.planner.hand_over == "pass":
-        raise ScenarioError(str(scenario.path), "planner.hand_over", "pass", "rest for robots apart")
     if period is None:
         allowed = "a number of Hz, such as 200: controllers apart from each other compute at samples"
         raise ScenarioError(str(scenario.path), "deployment.control_rate", None, allowed)
@@ -76,9 +74,10 @@ def control_period(scenario: Scenario) -> float:
 
 def record_sizes(scenario: Scenario, plan: Plan, joints: Sequence[int]) -> tuple[dict[str, int], ...]:
     """Return names and sizes of what robots with numbers of joints, then their supervisor, report."""
-    holds = hold_of(scenario, plan) is not None
-    robots = (robot_record(n, holds=holds, monitored=plan.alarms is not None) for n in joints)
-    return (*robots, supervisor_record(len(joints), holds=holds))
+    holds, passes = hold_of(scenario, plan) is not None, plan.motion is not None
+    monitored = plan.alarms is not None
+    robots = (robot_record(n, holds=holds, monitored=monitored, passes=passes) for n in joints)
+    return (*robots, supervisor_record(len(joints), holds=holds or passes, passes=passes))
 
 
 def brakes_of(scenario: Scenario, team: TeamPlant) -> list[Brake]:

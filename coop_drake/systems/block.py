@@ -50,9 +50,10 @@ def robot_record(
     return record | ({"current_cell": CURRENT_CELL_SIZE, "phase": PHASE_SIZE} if passes else {})
 
 
-def supervisor_record(robots: int, *, holds: bool) -> dict[str, int]:
+def supervisor_record(robots: int, *, holds: bool, passes: bool = False) -> dict[str, int]:
     """Return the names and sizes of the outputs of the supervisor of N robots that are logged."""
-    return {"current_cell": CURRENT_CELL_SIZE, "arrived": 1, "causes": 1 + robots if holds else 0}
+    cell = 0 if passes else CURRENT_CELL_SIZE
+    return {"current_cell": cell, "arrived": 1, "causes": 1 + robots if holds else 0}
 
 
 _ON_TIME = np.array([0.0, 1.0, 0.0])

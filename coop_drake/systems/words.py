@@ -97,6 +97,7 @@ class _Speaker(Block):
         self.DeclarePeriodicUnrestrictedUpdateEvent(
             schedule.period, radio.offset, self._loosely(self._hear_and_speak)
         )
+        self.DeclareForcedUnrestrictedUpdateEvent(self._loosely(self._hear_and_speak))  # For processes.
 
     def _decide(self, context: Context, words: FloatArray, more: FloatArray) -> None:
         """Change the own row of the words, and the rest of the state."""
@@ -185,6 +186,11 @@ class RobotWords(_Speaker):
             said = _ALARMS.get(level, BRAKES)
         discrete_state.get_mutable_vector().get_mutable_value()[self._more + SAID] = said
 
+    def ask(self, context: Context) -> None:
+        """Let the robot ask for a hold at the next sample, at least."""
+        values, said = context.get_mutable_discrete_state_vector(), self._more + SAID
+        values[said] = max(values[said], float(ASKS))
+
     def _phase(self, context: Context, later: float) -> tuple[float, float, float]:
         motion = np.array(self.kept(context)[self._more : self._more + MOTION_SIZE])
         return phase_at(self._schedule, motion, context.get_time() + self._radio.clock_error + later)
@@ -220,6 +226,12 @@ class WordPlanner(_Speaker):
         self._order = self.DeclareVectorInputPort("order", 1)
         self.DeclareVectorOutputPort("arrived", 1, self._write_arrived, {self.xd_ticket()})
         self.DeclareVectorOutputPort("causes", 1 + radio.robots, self._write_causes, {self.xd_ticket()})
+
+    def forget(self, context: Context) -> None:
+        """Know nothing of a team that may be under way: another supervisor spoke to it before."""
+        words, radio = first_words(self._schedule, self._radio.robots, again=True), self._radio
+        first = [*words.ravel(), *np.tile(words[radio.row], radio.kept)]
+        context.get_mutable_discrete_state_vector().get_mutable_value()[: self._more] = first
 
     def _decide(self, context: Context, words: FloatArray, more: FloatArray) -> None:
         wanted = not (self._order.HasValue(context) and self._order.Eval(context)[0] > 0.0)

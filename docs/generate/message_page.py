@@ -53,7 +53,7 @@ _SECTIONS = (
     (
         "The team's messages",
         "All that crosses between robots and supervisor. A world does not see it.",
-        {"the robot": KINDS["robot", "supervisor"], "the supervisor": KINDS["supervisor", "robot"]},
+        {"the robot": KINDS["robot", "supervisor"], "the supervisor": KINDS["supervisor", "robot"][:-1]},
     ),
 )
 
@@ -80,7 +80,8 @@ most {MOST_ROBOTS}, {SUPERVISOR} for the supervisor and {WORLD} for the world.
 
 The world and the supervisor listen, each with a `ROUTER` socket at its address of the [address
 book](../how_to/apart.md#addresses-and-keys). Robots connect to both, the supervisor to the world, each with
-a `DEALER` socket, and with the CURVE keys of the book if there are any.
+a `DEALER` socket, and with the CURVE keys of the book if there are any. In a team with `hand_over: pass`
+robots connect to all robots with larger indices, too.
 
 1. The process that connects draws a number for the session. It sends `Hello` with it every tenth of a second
    until the answer is `Welcome`. After `Refused` with a reason it may ask again.
@@ -131,7 +132,7 @@ def _type(kind: Any) -> str:
 
 def _world() -> str:
     """Return what who builds another world needs to know beside the messages."""
-    record = robot_record(1, holds=True, monitored=True)
+    record = robot_record(1, holds=True, monitored=True, passes=True)
     shown = ", ".join(f"`{name}` ({size})" for name, size in record.items())
     per_mass, per_inertia = f"{BASE_RATE:.4g}", f"{TURN_RATE:.4g}"
     return f"""## Building a world
@@ -146,9 +147,9 @@ and `Status`. It ends the run by `Goodbye`, for example after `arrived`.
 - **Time** is the world's. A robot with a wrong clock is told a wrong `time`. In lock-step the world waits for
   all answers; by the wall clock a sample is sent no earlier than at its time.
 - **Order**: a message of the team counts from the next sample on. So every answer says in `team_messages` how
-  many messages its sender has sent to the team, and the world hands this on: to a robot in its next `Sample`
-  the number that the last `Status` had for it, to the supervisor in its next `Tick` the numbers of the last
-  `Telemetry` of each robot. Before the first answer it is 0.
+  many messages its sender has sent to each of the team, and the world hands this on: in the next `Sample` or
+  `Tick` the numbers that the last `Telemetry` and `Status` had for its receiver. Before the first answer it
+  is 0.
 - **Stamps** lie m periods before `time` for a delay of m periods, and are 0 in the first m samples. Under a
   budget a robot asks for a hold, and after {LONGEST_DOUBT:g} s lets its drives brake, if the age of a
   measurement is wrong by more than `clock_error`, if pose and state are of different instants, if a stamp
@@ -160,8 +161,8 @@ and `Status`. It ends the run by `Goodbye`, for example after `arrived`.
   30 s.
 - **Digests** are compared as texts. A world that does not know them takes those of the first `Hello`.
 - **Telemetry** has these `values` in their order, with their numbers for a robot with one joint: {shown}.
-  `clock` is there in teams that can be held, `alarm` under a budget; `funnels` has the lower, then the upper
-  bounds of (theta, q_k).
+  `clock` is there in teams that can be held, `alarm` under a budget, the last two in teams that pass;
+  `funnels` has the lower, then the upper bounds of (theta, q_k).
 - **Braking**, where `stopped` is true or no effort comes in time: effort = -D (z' + {RETURN_RATE:g} /s (z -
   rest)), with `rest` of the last `Effort` that had one, else effort = -D z'. D is {per_mass} /s times the
   base's mass for both forces, {per_inertia} /s times its inertia about z through the origin of Bk for the

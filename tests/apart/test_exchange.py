@@ -48,8 +48,8 @@ class Team:
             now.append((index, msg.Status(number, time, True, (0,), 0, 0.0, False, (), 0)))
         else:
             if question.step:
-                now.append((0, msg.Effort(number, time, 0, 0, (float(number), 0.0, 0.0), ())))
-            now.append((0, msg.Telemetry(number, time, 0, 0, 0, (time,))))
+                now.append((0, msg.Effort(number, time, (0, 0), 0, (float(number), 0.0, 0.0), ())))
+            now.append((0, msg.Telemetry(number, time, (0, 0), 0, 0, (time,))))
         return True
 
     def receive(self, limit):
@@ -90,7 +90,9 @@ def test_a_robot_that_is_late_for_the_log_between_two_samples_is_not_missing(tea
     assert shown[0] == 0.0
     assert not exchange.missing
     team.late = False
-    team.answers.append((0, msg.Telemetry(1, 0.002, 0, 0, 0, (0.002,))))  # It comes after the next question.
+    team.answers.append(
+        (0, msg.Telemetry(1, 0.002, (0, 0), 0, 0, (0.002,)))
+    )  # It comes after the next question.
     shown = exchange.look(PERIOD, MEASURED)
     assert shown[0] == PERIOD
     assert exchange.step(PERIOD, MEASURED)[0][0] == 1.0
@@ -118,13 +120,13 @@ def test_drives_take_no_effort_that_rests_on_measurements_of_the_future_or_of_lo
     assert exchange.step(0.0, MEASURED)[0][0] == 0.0
     for stamp in (0.5, -0.1, float("nan")):
         before = team.refusals.counts[msg.Reason.STAMP]
-        exchange._keep(0, msg.Effort(0, stamp, 0, 0, (9.0, 9.0, 9.0), ()), admits=True)
+        exchange._keep(0, msg.Effort(0, stamp, (0, 0), 0, (9.0, 9.0, 9.0), ()), admits=True)
         assert team.refusals.counts[msg.Reason.STAMP] == before + 1
     assert exchange.step(PERIOD, MEASURED)[0][0] == 1.0
 
 
 GOOD, STATUS = (
-    msg.Effort(0, 0.0, 1, 0, (1.0, 2.0, 3.0), ()),
+    msg.Effort(0, 0.0, (0, 1), 0, (1.0, 2.0, 3.0), ()),
     msg.Status(0, 0.0, True, (0,), 0, 0.0, False, (), 0),
 )
 
@@ -292,14 +294,14 @@ def test_late_messages_leave_after_what_is_sent_then_and_count_where_nothing_has
 
 def test_nothing_passes_a_gap_but_what_the_log_needs():
     gap = Gap(0.02, 0.03, robots=(0,))
-    samples = [msg.Sample(k, k * STEP, True, False, 0, 0.0, 0.0, (), ()) for k in range(8)]
+    samples = [msg.Sample(k, k * STEP, True, False, (), 0.0, 0.0, (), ()) for k in range(8)]
     faults = Faults(sensors=ChannelFaults(gaps=(gap,)), efforts=ChannelFaults(gaps=(gap,)))
     assert sending(faults, samples, msg.WORLD, 0)[0] == [(1,), (2,), (), (), (), (6,), (7,), (8,)]
     assert sending(faults, samples, msg.WORLD, 1)[1] == 8
     looks = [msgspec.structs.replace(sample, step=False) for sample in samples]
     assert sending(faults, looks, msg.WORLD, 0)[1] == 8
-    assert sending(faults, [msg.Effort(k, 0.0, 0, 0, (), ()) for k in range(8)], 0, msg.WORLD)[1] == 5
-    assert sending(faults, [msg.Telemetry(k, 0.0, 0, 0, 0, ()) for k in range(8)], 0, msg.WORLD)[1] == 8
+    assert sending(faults, [msg.Effort(k, 0.0, (), 0, (), ()) for k in range(8)], 0, msg.WORLD)[1] == 5
+    assert sending(faults, [msg.Telemetry(k, 0.0, (), 0, 0, ()) for k in range(8)], 0, msg.WORLD)[1] == 8
     assert sending(faults, [msg.Welcome()] * 8, msg.WORLD, 0)[0] == [(0,)] * 8
 
 

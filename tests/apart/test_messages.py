@@ -16,7 +16,7 @@ PAIRS = [(a, b) for a, b in product((0, msg.SUPERVISOR, msg.WORLD), repeat=2) if
 raw = msgspec.msgpack.encode
 
 SAMPLE = {
-    "type": "Sample", "number": 1, "time": 0.5, "step": True, "stopped": False, "team_messages": 0,
+    "type": "Sample", "number": 1, "time": 0.5, "step": True, "stopped": False, "team_messages": [0, 0, 2],
     "pose_stamp": 0.5, "state_stamp": 0.5, "object_pose": [1.0, 2.0, 0.5], "robot_state": [0.0] * 8,
 }  # fmt: skip
 
@@ -127,9 +127,9 @@ def test_whole_numbers_count_as_real_ones_and_short_reals_are_read():
 
 
 def test_what_only_the_log_shows_may_be_no_number_and_an_effort_may_not():
-    shown = msg.Telemetry(1, 0.0, 0, 0, 0, (math.nan, math.inf))
+    shown = msg.Telemetry(1, 0.0, (), 0, 0, (math.nan, math.inf))
     assert math.isnan(msg.decode(msg.encode(1, 1, shown), msg.decoder_of(0, msg.WORLD))[2].values[0])
-    refused(msg.encode(1, 1, msg.Effort(1, 0.0, 0, 0, (math.nan,), ())), 0, msg.WORLD)
+    refused(msg.encode(1, 1, msg.Effort(1, 0.0, (), 0, (math.nan,), ())), 0, msg.WORLD)
 
 
 def test_who_may_send_what():
@@ -143,6 +143,6 @@ def test_who_may_send_what():
 def test_a_hello_says_its_protocol_in_all_versions():
     assert msg.protocol_of(msg.encode(7, 0, msg.Hello(msg.PROTOCOL, 0, "", ""))) == (7, msg.PROTOCOL)
     assert msg.protocol_of(raw([7, 0, {"type": "Hello", "protocol": 9, "name": "left arm"}])) == (7, 9)
-    sample = msg.Sample(1, 0.0, True, False, 0, 0.0, 0.0, (), ())
+    sample = msg.Sample(1, 0.0, True, False, (), 0.0, 0.0, (), ())
     for other in (msg.encode(7, 1, sample), b"\1\x0d\xcd\4\0", NESTED, raw([7, 0, {"type": "Hello"}])):
         assert msg.protocol_of(other) is None

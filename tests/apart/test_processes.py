@@ -19,9 +19,20 @@ from coop_drake.apart.world import Pacing
 from coop_drake.diagram import build_world
 from coop_drake.errors import MessagingError, RefusalError
 from coop_drake.plant import planning_problem, run_setup
-from coop_drake.scenario import Control, Hold, Measurements, Messages
+from coop_drake.scenario import (
+    ActuatorLimits,
+    Control,
+    Deafness,
+    Deployment,
+    Hold,
+    Measurements,
+    Messages,
+    RobotDepartures,
+    Silence,
+)
 from coop_drake.simulation import communication, run_loop, simulate
 from coop_drake.verification.runs import verify_log
+from tests.support.motions import small_motion
 from tests.support.same_runs import differences
 from tests.support.small_loop import sampled, small_maps
 
@@ -143,15 +154,18 @@ class OutsideWorld:
             return None, fields
         return next(k for k, known in self._routes.items() if known[0] == route), fields
 
+    def _told(self, place):
+        everyone, nothing = (*range(self._robots), SUPERVISOR), [0] * (1 + self._robots)
+        return [self._counts.get(k, nothing)[place] for k in everyone]
+
     def _ask(self, time, measured, stamps, step):
         for k in (*range(self._robots), SUPERVISOR):
             fields = {"number": self._sample, "time": time, "step": step, "stopped": False}
             if k == SUPERVISOR:
-                heard = [self._counts.get(robot, 0) for robot in range(self._robots)]
-                fields |= {"type": "Tick", "team_messages": heard}
+                fields |= {"type": "Tick", "team_messages": self._told(-1)[:-1]}
             else:
                 own, (pose, state) = measured[k].tolist(), stamps[k].tolist()
-                fields |= {"type": "Sample", "team_messages": self._counts.get(SUPERVISOR, {}).get(k, 0)}
+                fields |= {"type": "Sample", "team_messages": self._told(k)}
                 fields |= {"pose_stamp": pose, "state_stamp": state}
                 fields |= {"object_pose": own[-3:], "robot_state": own[:-3]}
             unfitting = [fields | {"time": "now"}, fields | {"team_messages": [0] * 7}, {"type": "Stop"}]
@@ -167,8 +181,7 @@ class OutsideWorld:
                 self._efforts[sender] = np.array(fields["efforts"])
             elif fields["type"] != "Hello":
                 shown[sender] = fields
-        counts = {k: fields["team_messages"] for k, fields in shown.items()}
-        self._counts = counts | {SUPERVISOR: dict(enumerate(counts[SUPERVISOR]))}
+        self._counts = {k: fields["team_messages"] for k, fields in shown.items()}
         status = shown.pop(SUPERVISOR)
         self.refused = [status["refused"], *(fields["refused"] for fields in shown.values())]
         ends = [status["cell"], status["entry"], status["arrived"], *status["causes"]]
@@ -234,7 +247,7 @@ class Hostile:
         """Send twenty messages of all kinds on each connection that takes them."""
         session, number = self._dice.getrandbits(32), sample + 2
         forged = [
-            encode(session, number, Effort(sample, 0.01 * sample, 9, 0, (1e6,) * 5, ())),
+            encode(session, number, Effort(sample, 0.01 * sample, (0, 0, 9), 0, (1e6,) * 5, ())),
             encode(session, number, Ready(0, ready=True)),
             encode(session, number, Switch(1, sample)),
             encode(session, 0, Hello(PROTOCOL, 0, "", "")),
@@ -406,3 +419,63 @@ def test_the_same_faults_give_the_same_run():
     assert differences(first, run_case("measurements and efforts")[0]) == []
     assert facts["refused"].keys() == {"SEQUENCE"}
     assert min(process["refused"] for process in facts["processes"]) > 0
+
+
+# Teams that pass from cell to cell: words between all.
+
+
+def passing_problem(team="base", **departures):
+    scenario, plan = small_motion(team)
+    return replace(scenario, deployment=Deployment(control_rate=200.0, **departures)), plan
+
+
+@pytest.mark.parametrize(
+    "fault",
+    [{"deaf": Deafness(0.7, 0.5)}, pytest.param({"silence": Silence(0.6, 0.5)}, marks=pytest.mark.slow)],
+)
+def test_a_passing_team_is_held_and_goes_on_as_in_one_process(fault):
+    problem = passing_problem(
+        measurements=Measurements(1e-4, 5e-5, 1e-3, delay=0.01),
+        actuators=ActuatorLimits(lag=0.005),
+        messages=Messages(loss=0.2, delay=0.01),
+        robots={
+            "robot_0": RobotDepartures(clock_error=0.0015, **fault),
+            "robot_1": RobotDepartures(clock_error=-0.0015),
+        },
+    )
+    log, facts, _ = run(problem)
+    assert log.reached
+    assert differences(log, simulate(*problem, small_maps())) == []
+    samples = round(log.times[-1] / 0.005)
+    assert [process["team_messages"] for process in facts["processes"]] == [2 * (samples + 1)] * 3
+
+
+def test_words_that_are_lost_late_or_cut_off_hold_a_passing_team_at_most():
+    faults = Faults(
+        team=ChannelFaults(loss=0.2, late=0.1, late_by=0.01, gaps=(Gap(0.6, 0.3, robots=(1,)),)),
+        clocks=(ClockFault(0, 0.001, 1e-5),),
+    )
+    log, facts, _ = run(passing_problem(), faults=faults)
+    assert log.reached
+    assert nothing_touched(log)
+    assert log.governor_spread.max() <= 0.004
+    moves = (log.phases[:, :, 1] > 0.0).any(axis=1)
+    assert np.count_nonzero(moves[1:] & ~moves[:-1]) >= 2
+    assert facts["refused"] == {}
+
+
+def test_a_passing_team_of_which_a_robot_is_killed_comes_to_rest_and_is_not_begun_anew():
+    log, facts, _ = run(passing_problem(), {120: kill(0)}, restarts=0, rejoin=0.1)
+    assert not log.reached
+    assert "robot 0 has not answered since t = 0.595 s; the team rests since" in log.violation
+    assert nothing_touched(log)
+    assert len(facts["stops"]) == 1
+
+
+@pytest.mark.slow
+def test_the_supervisor_of_a_passing_team_is_started_again_and_sees_it_arrive():
+    log, facts, _ = run(passing_problem(), {300: kill(SUPERVISOR)})
+    assert log.reached
+    assert nothing_touched(log)
+    assert facts["restarts"] == {"the supervisor": 1}
+    assert facts["stops"] == []

@@ -5,6 +5,8 @@ import random
 import signal
 from contextlib import ExitStack
 from dataclasses import replace
+from itertools import permutations
+from math import inf
 from multiprocessing import get_context
 from socket import create_connection
 from time import monotonic
@@ -17,12 +19,12 @@ from coop_drake.apart import messages as msg
 from coop_drake.apart.faults import ChannelFaults, Faults
 from coop_drake.apart.team_files import local_book, make_keys
 from coop_drake.apart.transport import Ends, Network
-from coop_drake.errors import MessagingError
+from coop_drake.errors import MessagingError, ScenarioError
 
 LIMIT = 10.0
 """Longest time that a test waits for what must come [s]."""
 
-EFFORT = msg.Effort(1, 0.0, 0, 0, (1.0, 2.0, 3.0), ())
+EFFORT = msg.Effort(1, 0.0, (), 0, (1.0, 2.0, 3.0), ())
 
 
 class Team:
@@ -76,7 +78,7 @@ class Team:
         assert robot.send(msg.WORLD, EFFORT)
         assert news(self.world) == (0, EFFORT)
         number = self.world.sent(0)
-        assert self.world.send(0, msg.Sample(number, 0.0, True, False, 0, 0.0, 0.0, (), ()))
+        assert self.world.send(0, msg.Sample(number, 0.0, True, False, (), 0.0, 0.0, (), ()))
         assert news(robot)[1].number == number
 
     def close(self):
@@ -130,7 +132,7 @@ def test_everything_crosses_and_comes_in_its_order(with_keys, team_keys):
         for number in range(1, 4):
             for k, robot in enumerate(robots):
                 sample = msg.Sample(
-                    number, 0.1 + number, True, False, 0, 0.0, 0.0, (1.0, 2.0, 0.5), (0.1 * k,)
+                    number, 0.1 + number, True, False, (), 0.0, 0.0, (1.0, 2.0, 0.5), (0.1 * k,)
                 )
                 assert team.world.send(k, sample)
                 assert news(robot) == (msg.WORLD, sample)
@@ -214,6 +216,24 @@ def test_a_process_that_is_stopped_loses_its_name_after_two_seconds(team):
         process.join()
 
 
+def test_robots_of_a_team_that_passes_speak_to_each_other_and_wait_for_each_other(team):
+    ends = {k: team.join(k, passes=True) for k in (msg.SUPERVISOR, 0, 1)}
+    with pytest.raises(MessagingError, match="no message came from robot 0"):
+        ends[1].open(0.05)
+    team.settle(lambda: all(len(each.present()) == 3 for each in ends.values()), *ends.values())
+    word = msg.Word((1.0, 0.0, 0.5, 2.0, 3.0, inf, 0.0, inf, 1.0))
+    for sender, receiver in permutations(ends, 2):
+        assert ends[sender].send(receiver, word)
+        assert news(ends[receiver]) == (sender, word)
+    assert not any(each.refusals.total for each in ends.values())
+
+
+def test_robots_without_addresses_cannot_pass(team):
+    robots = tuple(replace(robot, address=None) for robot in team.book.robots)
+    with pytest.raises(ScenarioError, match=r"robots\[1\].address"):
+        team.join(0, passes=True, book=replace(team.book, robots=robots))
+
+
 def test_the_first_messages_are_those_of_the_session_which_begins_once(team):
     robot = team.join(0)
     while (taken := team.world.receive(0.01)) is None:
@@ -233,8 +253,8 @@ def test_the_first_messages_are_those_of_the_session_which_begins_once(team):
         (msg.Hello(msg.PROTOCOL, 0, "scenario", "another"), "it has another plan", "SESSION"),
         (msg.Hello(msg.PROTOCOL, 7, "scenario", "plan"), "it knows no process of this name", "SENDER"),
         (
-            {"type": "Hello", "protocol": 6, "name": "arm"},
-            f"it speaks protocol {msg.PROTOCOL}, not 6",
+            {"type": "Hello", "protocol": 7, "name": "arm"},
+            f"it speaks protocol {msg.PROTOCOL}, not 7",
             "VERSION",
         ),
         (msg.Hello(4, 0, "scenario", "plan"), f"it speaks protocol {msg.PROTOCOL}, not 4", "VERSION"),
@@ -278,7 +298,7 @@ def test_messages_of_another_session_or_with_a_passed_number_are_refused(team):
     robot.sessions[msg.WORLD]._put(data)
     assert team.refused(4) == {"SESSION": 3, "SEQUENCE": 1}
     team.works_for(robot)
-    sample = msg.Sample(9, 0.0, True, False, 0, 0.0, 0.0, (), ())
+    sample = msg.Sample(9, 0.0, True, False, (), 0.0, 0.0, (), ())
     for number, own in ((1, session), (5, session ^ 1)):
         team.world.sessions[0]._put(msg.encode(own, number, sample))
     team.settle(lambda: robot.refusals.total == 2, robot)
@@ -327,7 +347,7 @@ def test_connections_that_do_not_speak_zeromq_do_no_harm(team):
 
 def test_a_peer_that_floods_takes_turns_with_the_others_and_is_not_kept_for_ever(team):
     robot, flooder = team.connect(0), team.connect(1)
-    shown = msg.Telemetry(1, 0.0, 0, 0, 0, (0.0,) * msg.MOST_ITEMS)
+    shown = msg.Telemetry(1, 0.0, (), 0, 0, (0.0,) * msg.MOST_ITEMS)
     sent = 0
     while flooder.send(msg.WORLD, shown):
         sent += 1
@@ -346,7 +366,7 @@ def test_both_ends_count_what_is_lost_repeated_and_late(team):
     robot = team.connect(0, faults=faults, period=0.01)
     for sample in range(60):
         robot.sample = sample
-        robot.send(msg.WORLD, msg.Effort(sample, 0.0, 0, 0, (), ()))
+        robot.send(msg.WORLD, msg.Effort(sample, 0.0, (), 0, (), ()))
         robot.release()
     count = robot.sent(msg.WORLD)
     heard = [team.world.receive(LIMIT)[1].number for _ in range(count)]
