@@ -451,6 +451,15 @@ def test_who_never_hears_that_a_cell_is_begun_stops_before_its_end():
     assert braked - said == pytest.approx(schedule.window, abs=1.01 * schedule.period)
 
 
+@pytest.mark.parametrize(("age", "fit"), [(WINDOW - 1e-6, 1.0), (WINDOW + 1e-6, 0.0)])
+def test_who_was_not_heard_for_longer_than_words_may_take_is_missed(age, fit):
+    schedule = even_schedule(3)
+    words, motion = w.first_words(schedule, 2), w.first_motion()
+    words[1, w.STAMP] = 7.0 - age
+    w.robot_step(schedule, 7.0, w.QUIET, 0, motion, words)
+    assert words[0, w.FIT] == fit
+
+
 def test_a_hold_behind_the_start_that_comes_just_after_it_stops_where_the_robot_is():
     team = Team(even_schedule(5), [0.7] * 2)
     team.until(all_are(w.RUN))
