@@ -22,7 +22,7 @@ from coop_drake.compiled_loop.arrays import (
 from coop_drake.jit import compiled
 from coop_drake.laws import words
 from coop_drake.laws.axis_table import track_axes, write_jumps
-from coop_drake.laws.measurements import NOTHING, carry_measurements, uniform_pair, write_errors
+from coop_drake.laws.measurements import NOTHING, TURN, carry_measurements, uniform_pair, write_errors
 from coop_drake.laws.motion import motion_at, place_on_axes, pull
 from coop_drake.laws.nominal import carry_axes, pull_axes, track_nominal
 from coop_drake.laws.readiness import (
@@ -330,7 +330,10 @@ def _err(
             if sample == 0:
                 before[first + i] = values[i]
         for i in range(values.size):
-            values[i] -= shift * (values[i] - before[first + i])
+            moved = values[i] - before[first + i]
+            if i == 2:  # an angle, which may jump by a turn
+                moved -= TURN * np.rint(moved / TURN)
+            values[i] -= shift * moved
     largest = 0.0
     for i in range(values.size):
         largest = max(largest, sizes[i, 0], sizes[i, 1])

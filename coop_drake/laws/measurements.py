@@ -135,6 +135,10 @@ def write_errors(
             errors[i] += size if passed - floor(passed) < 0.5 else -size
 
 
+TURN = 2.0 * pi
+"""A turn [rad]."""
+
+
 # What channels hold that lose and delay what they carry: reports of robots, and measurements.
 
 NOTHING = -1.0

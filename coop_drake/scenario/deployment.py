@@ -177,7 +177,7 @@ class ActuatorLimits:
 
 @dataclass(frozen=True)
 class Messages:
-    """How ready reports travel; every robot sends one in each control period.
+    """How ready reports or words travel; every robot sends one in each control period.
 
     Attributes:
         loss: Probability that a report is lost [-].
@@ -207,7 +207,7 @@ class PoseBias:
 
 @dataclass(frozen=True)
 class Silence:
-    """A robot that sends no reports for a while; its motors may fail with it.
+    """A robot that sends nothing for a while; its motors may fail with it.
 
     Attributes:
         begin: When it falls silent [s].
@@ -223,7 +223,7 @@ class Silence:
 
 @dataclass(frozen=True)
 class Deafness:
-    """A robot that hears nothing of the hold supervisor for a while.
+    """A robot that hears nothing of the hold supervisor, or no words, for a while.
 
     Attributes:
         begin: When it hears nothing any more [s].
@@ -276,7 +276,7 @@ class RobotDepartures:
         odometry_scale: By how much it overestimates the rates of its base, relative [-].
         sample_offset: By how much later than the others it measures and computes, less than a period [s].
         clock_error: By how much its clock is ahead of the others' [s].
-        switch_delay: How much later than the others it hears of a new cell [s].
+        switch_delay: How much later than the others it hears of a new cell, or all words [s].
         silence: When it sends no reports, null for never.
         deaf: When it hears nothing of the hold supervisor, null for never.
         blocked: When the wheels of its base are blocked, null for never.

@@ -10,6 +10,7 @@ from pydrake.systems.primitives import Selector
 
 from coop_drake.laws.measurements import (
     NOTHING,
+    TURN,
     carry_measurements,
     observe,
     period_of,
@@ -158,6 +159,8 @@ class ShiftedMeasurement(Block):
     output  ``measured`` n    the same at the instant of the wrong clock
     ======= ============ ==== ===============================================
 
+    The third number is an angle, which may jump by a turn.
+
     State: one discrete group (n), updated every period: what there was to measure then.
 
     Args:
@@ -177,7 +180,9 @@ class ShiftedMeasurement(Block):
 
     def _write_measured(self, context: Context, output: BasicVector) -> None:
         exact = self._exact.Eval(context)
-        output.SetFromVector(exact - self._share * (exact - self.kept(context)))
+        moved = exact - self.kept(context)
+        moved[2:3] -= TURN * np.rint(moved[2:3] / TURN)
+        output.SetFromVector(exact - self._share * moved)
 
     def _remember(self, context: Context, discrete_state: DiscreteValues) -> None:
         discrete_state.get_mutable_vector().SetFromVector(self._exact.Eval(context))

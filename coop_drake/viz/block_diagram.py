@@ -162,8 +162,9 @@ def block_diagram_figure(loop: ClosedLoop, robot: int = 0) -> Figure:
     if not 0 <= robot < len(loop.bare_controllers):
         raise IndexError(f"robot {robot} is not in the team of {len(loop.bare_controllers)}")
     controller, telemetry = loop.bare_controllers[robot], frozenset(TELEMETRY)
+    said = "ready reports" if loop.plan.motion is None else "words"
     drawings = (
-        _Drawing(signal_flow(loop.diagram, "Closed loop: between robots only ready reports cross")),
+        _Drawing(signal_flow(loop.diagram, f"Closed loop: between robots only {said} cross")),
         _Drawing(signal_flow(controller, f"Controller of robot {robot}", telemetry=telemetry)),
     )
     width = max(one.right - one.left for one in drawings)

@@ -535,6 +535,16 @@ def test_the_common_brake_stops_all_at_once_and_a_new_start_ends_it():
     team.until(arrived)
 
 
+@pytest.mark.parametrize("other", [2, 3])
+def test_a_hold_reaches_a_robot_by_way_of_another_one_or_of_the_supervisor(other):
+    team = Team(even_schedule(6), [0.0] * 3)
+    team.until(lambda team: team.time > 1.5)
+    team.closed, team.alarms[0] = {(0, 1), (0, 5 - other)}, w.ASKS
+    for _ in range(3):
+        team.step()
+    assert team.words[1, 1, w.HOLD] == team.words[0, 0, w.HOLD] < inf
+
+
 @pytest.mark.parametrize(("wrong", "holds"), [(1.9, False), (6.0, True)])
 def test_a_stamp_that_clocks_do_not_allow_asks_for_a_hold(wrong, holds):
     schedule = even_schedule(6)

@@ -99,6 +99,16 @@ def test_it_shows_what_was_or_will_be_by_the_motion_of_the_last_period(share, me
     np.testing.assert_allclose(block.GetOutputPort("measured").Eval(context), measured, atol=1e-15)
 
 
+def test_an_angle_that_jumps_by_a_turn_is_shifted_as_one_that_goes_on():
+    block = systems.ShiftedMeasurement(3, 0.5, PERIOD)
+    context = block.CreateDefaultContext()
+    block.GetInputPort("exact").FixValue(context, [0.0, 0.0, -np.pi + 0.01])
+    context.SetDiscreteState(block.EvalUniquePeriodicDiscreteUpdate(context))
+    block.GetInputPort("exact").FixValue(context, [0.0, 0.0, np.pi - 0.03])
+    measured = block.GetOutputPort("measured").Eval(context)[2]
+    assert np.angle(np.exp(1j * (measured - np.pi + 0.01))) == pytest.approx(0.0, abs=1e-12)
+
+
 def test_what_rests_is_measured_as_it_is():
     assert evaluate(systems.ShiftedMeasurement(1, 0.7, PERIOD), {"exact": [0.0]}, "measured", 0.3) == [0.0]
 
