@@ -14,10 +14,10 @@ from coop_drake.answers.log import SimulationLog
 from coop_drake.answers.plan import Plan
 from coop_drake.answers.problem import PlanningProblem
 from coop_drake.cli.summary import simulation_facts
-from coop_drake.diagram import RobotKnowledge
+from coop_drake.diagram import RobotKnowledge, build_closed_loop
 from coop_drake.diagram.robot_controller import team_schedule
 from coop_drake.errors import RefusalError, ScenarioError
-from coop_drake.laws.words import ASKS
+from coop_drake.laws.words import ASKS, WORD_SIZE
 from coop_drake.planning.motion_limits import largest_forces
 from coop_drake.plant.facts import run_setup
 from coop_drake.scenario import (
@@ -41,7 +41,7 @@ from coop_drake.verification.runs.motion import check_followed
 from coop_drake.verification.runs.rows import Rows
 from coop_drake.verification.runs.verify_log import verify_log
 from tests.support.motions import passing, planned_motion
-from tests.support.small_loop import small_problem
+from tests.support.small_loop import small_maps, small_problem
 from tests.support.small_plan import with_motion
 
 Transport = tuple[Scenario, PlanningProblem, Plan, SimulationLog]
@@ -207,6 +207,21 @@ def test_a_deployed_team_stops_where_words_lack_goes_on_and_arrives(transport: T
     )
     away = np.hstack([log.object_pose, log.joints]) - spline(log.phases[:, 0, 0])
     assert np.abs(away).max() < 1e-3  # about what the clock's error moves by: 0.5 m/s
+
+
+def test_between_robots_only_words_cross() -> None:
+    scenario, plan = small_problem("base")
+    deployment = Deployment(control_rate=200.0, messages=Messages(delay=0.01))
+    loop = build_closed_loop(replace(scenario, deployment=deployment), with_motion(plan), small_maps())
+    crossing = {
+        (source.get_output_port(output).get_name(), source.get_output_port(output).size())
+        for (sink, _), (source, output) in loop.diagram.connection_map().items()
+        if "transport_station" not in (source.get_name(), sink.get_name())
+    }
+    rows = 1 + 2  # of the last periods: words are late by two
+    robots = len(loop.controllers)
+    assert {size for name, size in crossing if name == "said"} == {rows * WORD_SIZE}
+    assert {size for name, size in crossing if name != "said"} == {(robots + 1) * rows * WORD_SIZE}
 
 
 def test_a_hold_by_energies_of_funnels_is_refused_by_key() -> None:
