@@ -373,7 +373,9 @@ def passing_team(at=0.7, **fault):
     own = {name: faults[name] for name in fault}
     return replace(
         EVERYTHING,
-        mass_error=0.03,
+        mass_error=0.01,
+        floor=Floor(coulomb_friction=0.2, viscous_friction=0.2, slope=0.0005),
+        joint_friction=JointFriction(coulomb=0.01, viscous=0.01),
         measurements=Measurements(1e-4, 5e-5, 1e-3, 0.008, loss=0.1, late=0.2, late_by=0.012),
         robots={
             "robot_0": RobotDepartures(odometry_scale=0.01, clock_error=CLOCKS[0], switch_delay=0.01, **own),
