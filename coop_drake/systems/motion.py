@@ -14,7 +14,7 @@ from coop_drake.systems.block import CURRENT_CELL_SIZE, PHASE_SIZE, Block, index
 from coop_drake.systems.governor import GovernedCell
 from coop_drake.systems.ppc import AxisLaw
 from coop_drake.systems.readiness import ReadyMonitor
-from coop_drake.tree.arrays import FloatArray, IntArray
+from coop_drake.tree.arrays import FloatArray
 
 NOW, STAMPED, AHEAD = range(3)
 """Of which time the motion is: now, when what is used was measured, when commands act on average."""
@@ -32,6 +32,8 @@ class MotionFollower(Block):
     input   ``phase_ahead``          3          those when commands act, on average; likewise
     output  ``nominal_motion``                  nominal (x, y, theta, q), their rates and            W
                                                 accelerations, of one time or of all three
+    output  ``pulled``               3 + n      desired accelerations of (x, y, theta) and of the    W
+                                                joints [m/s^2, rad/s^2]
     output  ``governor_command``     4          nominal velocity of L's origin now [m/s], its        W
                                                 desired acceleration [m/s^2]
     output  ``governor_position``    2          nominal position of L's origin now [m]               W
@@ -82,10 +84,12 @@ class MotionFollower(Block):
         )
         ports = self._object, self._robot, self._current
         seen, own, cell = ({self.input_port_ticket(port.get_index())} for port in ports)
-        self.DeclareVectorOutputPort("governor_command", 4, self._write_command, phased | seen)
+        read = phased | seen | (own if joints else set())
+        self._pulled = self.DeclareVectorOutputPort("pulled", 2 + axes, self._write_pulled, read)
+        self.DeclareVectorOutputPort("governor_command", 4, self._write_command, read)
         self.DeclareVectorOutputPort("governor_position", 2, self._write_position, phased)
         self.DeclareVectorOutputPort("energy_margin", 1, self._write_margin, phased | seen | cell)
-        self.DeclareVectorOutputPort("axis_acceleration", axes, self._write_axes, phased | seen | own)
+        self.DeclareVectorOutputPort("axis_acceleration", axes, self._write_axes, read)
         self.DeclareVectorOutputPort("funnels", 2 * axes, self._write_bounds, cell)
         if mounting is not None:
             self.DeclareVectorOutputPort("object_ahead", 6, self._write_object, phased | seen)
@@ -102,17 +106,14 @@ class MotionFollower(Block):
         nominal: FloatArray = self._nominal.Eval(context).reshape(self._shape)[min(time, self._shape[0] - 1)]
         return nominal
 
-    def _pulled(self, context: Context, joints: IntArray) -> FloatArray:
-        """Return the desired accelerations of (x, y, theta), and of some joints."""
-        pulled, seen = np.empty(3 + joints.size), self._object.Eval(context)
-        robot = self._robot.Eval(context) if joints.size else seen
+    def _write_pulled(self, context: Context, output: BasicVector) -> None:
+        seen = self._object.Eval(context)
+        robot = self._robot.Eval(context) if self._joints.size else seen
         ahead, expected = self._at(context, AHEAD), self._at(context, STAMPED)
-        pull(ahead, expected, joints, self._gains, seen, robot, pulled)
-        return pulled
+        pull(ahead, expected, self._joints, self._gains, seen, robot, output.get_mutable_value())
 
     def _write_command(self, context: Context, output: BasicVector) -> None:
-        pulled = self._pulled(context, self._joints[:0])
-        output.SetFromVector([*self._at(context, NOW)[1, :2], *pulled[:2]])
+        output.SetFromVector([*self._at(context, NOW)[1, :2], *self._pulled.Eval(context)[:2]])
 
     def _write_position(self, context: Context, output: BasicVector) -> None:
         output.SetFromVector(self._at(context, NOW)[0, :2])
@@ -124,7 +125,7 @@ class MotionFollower(Block):
         output[0] = kernels.cell_margin(edges, float(self._gains[0]), departing, nominal[0, :2].copy())[0]
 
     def _write_axes(self, context: Context, output: BasicVector) -> None:
-        output.SetFromVector(self._pulled(context, self._joints)[2:])
+        output.SetFromVector(self._pulled.Eval(context)[2:])
 
     def _write_bounds(self, context: Context, output: BasicVector) -> None:
         output.SetFromVector(self._bounds[index_of(self._current.Eval(context), len(self._bounds))])
