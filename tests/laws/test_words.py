@@ -401,6 +401,7 @@ def test_who_has_not_heard_a_start_that_others_have_given_up_leaves_its_epoch_wi
     team.gone = {3}
     team.until(lambda team: team.words[0, 0, w.EPOCH] == 1.0 and team.kinds[0] == w.REST)
     team.words[-1] = w.first_words(team.schedule, 3, again=True)
+    team.past[0, -1] = team.words[-1, -1]
     team.gone = team.closed = set()
     team.until(arrived)
 
