@@ -14,7 +14,7 @@ from coop_drake.cli.results import ResultFolder
 from coop_drake.cli.task import map_cache, map_cells, read_task, write_accuracies
 from coop_drake.errors import FieldError, ScenarioError
 from tests.support.scenarios import write_scenario
-from tests.support.small_plan import small_plan
+from tests.support.small_plan import small_plan, with_motion
 
 COMMANDS = {
     "plan": ("plan.json", "certificate.json", "table_1.md"),
@@ -138,6 +138,16 @@ def test_accuracies_of_all_cells_are_written_and_summed_up(tmp_path):
     assert reporter.facts["max_map_residual"] == max(row["residual"] for row in rows)
     assert reporter.facts["max_map_unknowns"] == max(row["unknowns"] for row in rows)
     assert reporter.facts["mapping_wall_seconds"] > 0.0
+
+
+def test_a_plan_with_a_motion_is_mapped_nowhere(tmp_path):
+    reporter, task = Reporter(machine=True, quiet=True), task_with(tmp_path, 1e-9)
+    maps = map_cells(task, with_motion(PLAN), reporter)
+    write_accuracies(task, maps, ResultFolder(tmp_path))
+    assert maps == ()
+    assert "maps" not in reporter.facts
+    assert not (tmp_path / "maps.json").exists()
+    assert not (tmp_path / "cache").exists()
 
 
 def test_maps_are_kept_unless_fresh_ones_are_asked_for(tmp_path):

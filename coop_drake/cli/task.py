@@ -74,6 +74,8 @@ def map_cache() -> MapStore:
 def map_cells(task: Task, plan: Plan, reporter: Reporter, *, fresh: bool = False) -> tuple[HarmonicMap, ...]:
     """Map every cell of a plan, and note how long it took and how accurate the maps are.
 
+    A team that follows a motion needs no maps, and none are made.
+
     ``fresh`` maps are all solved; others are read from the cache where it has them.
 
     Raises:
@@ -81,6 +83,8 @@ def map_cells(task: Task, plan: Plan, reporter: Reporter, *, fresh: bool = False
     """
     from coop_drake.simulation import build_maps
 
+    if plan.motion is not None:
+        return ()
     store, tolerance = None if fresh else map_cache(), task.scenario.maps.tolerance
     with reporter.stage("mapping", "mapping") as progress:
         try:
@@ -92,7 +96,9 @@ def map_cells(task: Task, plan: Plan, reporter: Reporter, *, fresh: bool = False
 
 
 def write_accuracies(task: Task, maps: tuple[HarmonicMap, ...], folder: ResultFolder) -> None:
-    """Write the estimated accuracy of every map as ``maps.json``."""
+    """Write the estimated accuracy of every map as ``maps.json``, if there are maps."""
+    if not maps:
+        return
     from coop_drake.files import write_atomically
     from coop_drake.simulation import accuracy_rows
 

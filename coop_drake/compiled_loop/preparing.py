@@ -19,7 +19,7 @@ from coop_drake.diagram.robot_controller import (
 )
 from coop_drake.errors import ScenarioError
 from coop_drake.geometry.polygons import BoundaryDistance
-from coop_drake.harmonic_maps import HarmonicMap, VelocityField
+from coop_drake.harmonic_maps import HarmonicMap
 from coop_drake.laws.ppc import governed_gains
 from coop_drake.laws.words import Schedule
 from coop_drake.plant import (
@@ -148,8 +148,8 @@ def _cells(scenario: Scenario, plan: Plan, maps: Sequence[HarmonicMap], joints: 
     cells, stacks = governed_cells(plan, maps), tuple[list[FloatArray], ...](([], [], [], []))
     goals = [arrival_goal(scenario, plan, own) for own in joints]
     for cell, region in zip(cells, plan.cells, strict=True):
-        assert isinstance(cell.field, VelocityField)  # governed_cells makes no other
-        found = cell.clearance.edges, BoundaryDistance(region.tidied).edges, *cell.field.kernel_arguments
+        field = (np.empty(0), np.empty(0)) if cell.field is None else cell.field.kernel_arguments
+        found = cell.clearance.edges, BoundaryDistance(region.tidied).edges, *field
         for stack, entry in zip(stacks, found, strict=True):
             stack.append(entry)
     first = [np.cumsum([0, *(len(entry) for entry in stack)]) for stack in stacks]

@@ -122,7 +122,7 @@ def robot_knowledge(
     Args:
         scenario: The scenario.
         plan: A plan for it.
-        maps: The harmonic map of every transition.
+        maps: The harmonic map of every transition; not read where the plan has a motion.
         team: The simulated team.
 
     Raises:
@@ -193,16 +193,23 @@ def team_schedule(scenario: Scenario, plan: Plan) -> Schedule | None:
 
 
 def governed_cells(plan: Plan, maps: Sequence[HarmonicMap]) -> list[GovernedCell]:
-    """Return what a governor needs of every cell of a plan, given the map of every transition."""
+    """Return what a governor needs of every cell of a plan, given the map of every transition.
+
+    Where the team follows a motion, maps are not read, and cells have no fields.
+    """
+    fields = [
+        None if plan.motion else _field(maps[index], transition.gains.governor_gain)
+        for index, transition in enumerate(plan.transitions)
+    ]
     return [
         GovernedCell(
             BoundaryDistance(plan.governed(index)),
-            _field(field_map, transition.gains.governor_gain),
+            field,
             transition.gains,
             before.gains,
         )
-        for index, (transition, before, field_map) in enumerate(
-            zip(plan.transitions, (plan.transitions[0], *plan.transitions[:-1]), maps, strict=True)
+        for index, (transition, before, field) in enumerate(
+            zip(plan.transitions, (plan.transitions[0], *plan.transitions[:-1]), fields, strict=True)
         )
     ]
 
@@ -363,7 +370,7 @@ def _check(plan: Plan, maps: Sequence[HarmonicMap], team: TeamPlant) -> None:
             f"the plan moves the joints {', '.join(plan.joint_names)}; the scenario's team has "
             f"{', '.join(team.joint_names)}"
         )
-    if len(maps) != len(plan.cells):
+    if plan.motion is None and len(maps) != len(plan.cells):
         raise PlanError(f"a plan of {len(plan.cells)} cells needs as many maps, not {len(maps)}")
 
 

@@ -25,7 +25,7 @@ def build_maps(
     workers: int | None = None,
     progress: Callable[[str, float], None] | None = None,
 ) -> tuple[HarmonicMap, ...]:
-    """Map every cell of a plan to the disk.
+    """Map every cell of a plan to the disk; none where the team follows a motion, which needs no fields.
 
     Every map is solved on one thread, whatever the number of workers: the result is the same to the last bit.
 
@@ -39,6 +39,8 @@ def build_maps(
     Raises:
         FieldError: A map cannot be built or its estimated error is too large; the message names the cell.
     """
+    if plan.motion is not None:
+        return ()
 
     def solve(index: int) -> HarmonicMap:
         cell, target = plan.governed(index), Point(plan.transitions[index].target)

@@ -26,13 +26,13 @@ class GovernedCell:
 
     Attributes:
         clearance: Signed distance to the boundary of the governed set [m].
-        field: Velocity field that leads to the cell's target.
+        field: Velocity field that leads to the cell's target; None where the team follows a motion.
         gains: Gains of the transition.
         before: Gains of the transition before; its own if there is none.
     """
 
     clearance: BoundaryDistance
-    field: VelocityField
+    field: VelocityField | None
     gains: TransitionGains
     before: TransitionGains | None = None
 
@@ -44,6 +44,7 @@ class GovernedCell:
     @property
     def known(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
         """What compiled laws of the cell take first: the row, edges of the governed set, and the field."""
+        assert self.field is not None  # Governors stand only where no motion is followed.
         return self.row, self.clearance.edges, *self.field.kernel_arguments
 
 
