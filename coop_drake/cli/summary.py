@@ -30,7 +30,7 @@ _ROWS = (
     ("peak base force", "{peak_base_wrench_n:.1f} N"),
     (
         "nearest to a limit of force",
-        "base of {force_of}, {force_n:.1f} N, limit {force_limit_n:.1f} by {force_by}",
+        "{force_of}, {force_n:.1f} N, limit {force_limit_n:.1f} ({force_by})",
     ),
     ("nearest to a limit of speed", "{nearest_to_a_limit}"),
     ("error at the end", "{final_position_error_m:.4f} m, {final_angle_error_rad:.4f} rad"),
@@ -221,7 +221,7 @@ def _force_facts(log: SimulationLog, problem: PlanningProblem) -> dict[str, Any]
         "force_of": log.robot_names[k],
         "force_n": float(peaks[k]),
         "force_limit_n": float(most[k]),
-        "force_by": "deployment.actuators.base_force" if by_drives else "limits.friction",
+        "force_by": "base_force" if by_drives else "friction",
     }
 
 

@@ -85,10 +85,10 @@ def test_forces_of_bases_are_what_accelerates_all_that_they_move(transport: Tran
     most = largest_forces(limits)
     np.testing.assert_allclose(most, [0.5 * 9.81 * 8.5] * 2)
     assert facts["force_n"] == pytest.approx(np.linalg.norm(log.base_wrenches[..., :2], axis=2).max())
-    assert (facts["force_by"], facts["force_limit_n"]) == ("limits.friction", most[0])
+    assert (facts["force_by"], facts["force_limit_n"]) == ("friction", most[0])
     drives = replace(problem, limits=replace(limits, base_forces=np.array([30.0, 50.0])))
     found = simulation_facts(plan, log, drives)
-    assert (found["force_of"], found["force_by"]) == ("robot_0", "deployment.actuators.base_force")
+    assert (found["force_of"], found["force_by"]) == ("robot_0", "base_force")
 
 
 def test_a_team_that_passes_needs_no_maps(transport: Transport) -> None:

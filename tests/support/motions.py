@@ -23,10 +23,15 @@ def passing(scenario: Scenario) -> Scenario:
 
 @cache
 def small_motion(team: str = "base") -> tuple[Scenario, Plan]:
-    """Scenario and hand-written plan of a team in the open room, with the quickest motion along it."""
+    """Scenario and hand-written plan of a team in the open room, with the quickest motion along it.
+
+    The motion keeps a hundredth of a radian to the ends of the cells, so that the team may depart from it.
+    """
     scenario, found = small_problem(team)
     scenario = passing(scenario)
-    return scenario, replace(found, motion=quickest_motion(found, planning_problem(scenario), 0.0175))
+    cells = tuple(replace(one, lower=one.lower + 0.01, upper=one.upper - 0.01) for one in found.cells)
+    narrow, problem = replace(found, cells=cells), planning_problem(scenario)
+    return scenario, replace(found, motion=quickest_motion(narrow, problem, 0.0175))
 
 
 @cache
