@@ -72,7 +72,6 @@ class Membership:
         rejoin: How long a team at rest waits for who is missing [s], by the wall clock.
         processes: Knows which processes have ended, and may start them again.
         tell: Is told what happens.
-        again: Whether a team can begin its cell anew from where drives bring it to rest.
 
     Attributes:
         missing: Since which simulated time each missing process is missing [s].
@@ -89,9 +88,7 @@ class Membership:
         rejoin: float,
         processes: Processes,
         tell: Callable[[str], None],
-        again: bool = True,
     ) -> None:
-        self._again = again
         self.missing, self.stops, self.stopped = dict[int, float](), list[Stop](), False
         self.trouble, self.revived = "", list[int]()
         self.tolerated = tolerated
@@ -132,9 +129,6 @@ class Membership:
         self._rests = (time if self._rests is None else self._rests) if rests else None
         if self.stopped and rests and self.stops[-1].rested is None:
             self.stops[-1].rested = time
-        if self.stopped and rests and not self._again:
-            cause = f"the drives braked because of {self.stops[-1].cause}"
-            self.give_up() if self.missing else self._end(f"{cause}, off the motion of the plan")
         if self._stranded(time, states):
             why = LATE if LATE in states.values() else OUTSIDE
             names = " and ".join(name_of(k) for k in sorted(states) if states[k] == why)

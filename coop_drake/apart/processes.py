@@ -194,8 +194,7 @@ class LocalTeam(Processes):
     ) -> None:
         self._problem, self._network = (scenario, plan, maps), network
         self.processes = dict[int, BaseProcess | _FreshProcess]()
-        robots = range(len(network.book.robots))  # None of them takes up a motion on its way.
-        self._left = {SUPERVISOR: restarts, **dict.fromkeys(robots, 0 if network.passes else restarts)}
+        self._left = dict.fromkeys((SUPERVISOR, *range(len(network.book.robots))), restarts)
 
     def __enter__(self) -> LocalTeam:
         for index in self._left:

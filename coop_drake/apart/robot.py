@@ -495,6 +495,8 @@ class RobotProcess(nodes.NodeProcess):
         super().__init__(ends, [index for index in self._everyone if index in ends.sessions])
         self._node, self._team = node, ends.sessions[msg.SUPERVISOR]
         self._placed, self._placing = 0, -inf
+        self._word: Any = None
+        self._met = dict[int, int]()
         self._stepped: int | None = None
         self._measured, self._stamps = np.zeros(0), (0.0, 0.0)
 
@@ -538,16 +540,27 @@ class RobotProcess(nodes.NodeProcess):
             self._placing = now
             self._node.meet()
 
+    def _say_again(self) -> None:
+        """Repeat the last word to those with whom there is a new session: they may be new."""
+        counts = {index: self._ends.sessions[index].count for index in self._mail}
+        for index, count in counts.items() if self._word is not None else ():
+            if count != self._met.get(index):
+                self._ends.send(index, self._word)
+        self._met = counts
+
     def _answer(self, question: msg.Sample) -> None:
         number, time, node, ends = question.number, question.time, self._node, self._ends
         measured = np.array([*question.robot_state, *question.object_pose])
         ends.sample = number
         self._say_place()
+        self._say_again()
         shown = tuple(node.look(node.instant(time, number) if question.step else time, measured).tolist())
         if question.step:
             effort, said = self._steps(question, measured)
             for message in said:
-                for index in self._mail if isinstance(message, msg.Word) else [msg.SUPERVISOR]:
+                words = isinstance(message, msg.Word)
+                self._word = message if words else None
+                for index in self._mail if words else [msg.SUPERVISOR]:
                     ends.send(index, message)
             rest = () if node.rest is None else tuple(node.rest.tolist())
             stamp, sent = min(question.pose_stamp, question.state_stamp), self._sent()

@@ -144,7 +144,6 @@ class SampleExchange:
             rejoin=rejoin,
             processes=processes or Processes(),
             tell=tell,
-            again=not network.passes,
         )
         self.missing, self.brakes = self.membership.missing, list[Brake]()
         self.sample, self._still = 0, Stillness(network.period)

@@ -19,8 +19,11 @@ from coop_drake.laws.words import (
     EPOCH,
     HELD,
     HOLD,
+    KIND,
     MOTION_SIZE,
+    PHASE,
     QUIET,
+    REST,
     STAMP,
     THERE,
     WAITS,
@@ -185,6 +188,23 @@ class RobotWords(_Speaker):
         if self._alarm is not None and (level := self._alarm.Eval(context)[0]) > readiness.QUIET:
             said = _ALARMS.get(level, BRAKES)
         discrete_state.get_mutable_vector().get_mutable_value()[self._more + SAID] = said
+
+    def rest_at(self, context: Context, phase: float, like: FloatArray | None = None) -> None:
+        """Let the robot rest from now on where its drives bring it.
+
+        Args:
+            context: Its context.
+            phase: Where on the motion that is [s].
+            like: What somebody else says who rests, whose epoch and cell it takes over; None for its own.
+        """
+        values = context.get_mutable_discrete_state_vector().get_mutable_value()
+        words, more, row = values[: self._heard].reshape(-1, WORD_SIZE), values[self._more :], self._radio.row
+        if like is not None:
+            words[row] = like
+        words[row, KIND], words[row, PHASE], words[row, HOLD] = REST, phase, phase
+        index = max(int(np.searchsorted(self._schedule.begins, phase, side="right")) - 1, 0)
+        more[:CELL], more[CELL] = first_motion(phase), index
+        more[PAST:] = np.tile([phase, 0.0, 0.0], (more.size - PAST) // PHASE_SIZE)
 
     def ask(self, context: Context) -> None:
         """Let the robot ask for a hold at the next sample, at least."""

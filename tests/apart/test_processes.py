@@ -464,7 +464,18 @@ def test_words_that_are_lost_late_or_cut_off_hold_a_passing_team_at_most():
     assert facts["refused"] == {}
 
 
-def test_a_passing_team_of_which_a_robot_is_killed_comes_to_rest_and_is_not_begun_anew():
+@pytest.mark.parametrize("killed", [0, pytest.param(1, marks=pytest.mark.slow)])
+def test_a_passing_team_of_which_a_robot_is_killed_rests_on_its_motion_and_goes_on(killed):
+    log, facts, _ = run(passing_problem(), {140: kill(killed)})
+    assert log.reached, log.violation
+    assert facts["restarts"] == {f"robot {killed}": 1}
+    (stop,) = facts["stops"]
+    assert 0.6 < stop["rested"] < stop["resumed"] < log.times[-1]
+    assert nothing_touched(log)
+    assert log.cell_clearance.min() > 0.0
+
+
+def test_a_passing_team_of_which_a_robot_stays_away_ends_at_rest():
     log, facts, _ = run(passing_problem(), {120: kill(0)}, restarts=0, rejoin=0.1)
     assert not log.reached
     assert "robot 0 has not answered since t = 0.595 s; the team rests since" in log.violation
