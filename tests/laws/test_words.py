@@ -327,6 +327,17 @@ def test_a_stop_stands_in_the_motion_as_soon_as_it_is_less_than_the_window_away(
         assert team.now[0][1:] == pytest.approx(said[1:], abs=1e-12) or team.kinds[0] == w.REST
 
 
+def test_who_has_crept_to_a_start_that_is_called_off_stays_there():
+    team = Team(even_schedule(6), [0.45, 0.7])
+    team.until(all_are(w.ARMED))
+    begin = team.motions[0, w.BEGIN]
+    team.until(lambda team: team.time > begin - 1.9 * team.schedule.window)
+    team.alarms[1] = w.ASKS
+    team.until(all_are(w.REST))
+    team.step()
+    assert team.phases.tolist() == [0.7, 0.7]
+
+
 def test_one_that_rests_before_the_goal_creeps_there():
     schedule = even_schedule(3)
     end = schedule.ends[-1]
@@ -546,6 +557,16 @@ def test_a_hold_reaches_a_robot_by_way_of_another_one_or_of_the_supervisor(other
     assert team.words[1, 1, w.HOLD] == team.words[0, 0, w.HOLD] < inf
 
 
+def test_a_robot_that_brakes_passes_on_a_hold_before_its_own():
+    team = Team(even_schedule(6), [0.0] * 2)
+    team.until(lambda team: team.time > 1.5)
+    team.wanted = False
+    team.until(all_are(w.BRAKE))
+    team.words[0, 1, w.HOLD] = 0.9 * team.words[0, 0, w.HOLD]
+    team.step()
+    assert team.words[0, 0, w.HOLD] == team.words[0, 1, w.HOLD]
+
+
 @pytest.mark.parametrize(("wrong", "holds"), [(1.9, False), (6.0, True)])
 def test_a_stamp_that_clocks_do_not_allow_asks_for_a_hold(wrong, holds):
     schedule = even_schedule(6)
@@ -570,6 +591,26 @@ def test_people_hold_the_team_at_a_brake_phase_and_let_it_go_on():
     assert team.code == (w.HELD, -1)
     team.wanted = True
     team.until(arrived)
+
+
+def test_a_robot_whose_monitor_is_not_quiet_says_no_cell_begun_that_it_enters():
+    schedule = even_schedule(6)
+    team = Team(schedule, [0.0] * 3)
+    team.until(lambda team: team.time > 0.5 and team.phases[0] > schedule.begins[2])
+    team.alarms[1] = w.ASKS
+    team.until(all_are(w.REST))
+    assert team.phases[1] > schedule.begins[3]
+    assert [team.words[k, k, w.CELL] for k in range(3)] == [3.0, 2.0, 3.0]
+
+
+@pytest.mark.parametrize(("share", "brake"), [(1.2, 3), (0.5, 4)])
+def test_people_hold_the_team_where_all_can_still_have_heard_of_it(share, brake):
+    schedule = even_schedule(6)
+    team = Team(schedule, [0.0] * 3)
+    team.until(lambda team: team.time > 0.5 and team.phases[0] > schedule.brakes[3] - share * schedule.window)
+    team.wanted = False
+    team.step()
+    assert team.words[-1, -1, w.HOLD] == schedule.brakes[brake]
 
 
 def test_the_supervisor_names_the_robot_that_it_waits_for():
