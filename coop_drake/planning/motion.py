@@ -102,6 +102,9 @@ BRAKE_RAMP = 0.1
 WEIGHTS = (0.1, 0.03, 0.01, 3e-3, 1e-3, 3e-4), (2e-4,), (1e-4, 3e-5)
 """Weights of the barrier in the three phases [s]."""
 
+FEW = 200
+"""With more points than this, weights are as many times smaller: limits of all points add to the barrier."""
+
 DONE = 50.0
 """The next weight is taken when a step promises a decrease of less than this many weights [-]."""
 
@@ -121,7 +124,7 @@ FINER = 2
 """How often spans are halved where the initial path does not enter every cell, or limits between knots ask
 for much slower motions [-]."""
 
-STEPS, ROUNDS = 2, 80
+STEPS, ROUNDS = 2, 120
 """Newton steps with the same half-planes, and how often new half-planes are made at most [-]."""
 
 SLOWER = 1.01
@@ -449,11 +452,11 @@ class _Program:
         return pieces_inside(self.cells, self.points[:, :-1], shares)
 
     def solve(self, weights: tuple[float, ...]) -> None:
-        """Take Newton steps with smaller and smaller weights of the barrier."""
-        at = 0
+        """Take Newton steps with smaller and smaller weights of the barrier, smaller for more points."""
+        at, share = 0, min(1.0, FEW / len(self.points))
         for _ in range(ROUNDS):
             self.lay_course()
-            done = self.improve(weights[at])
+            done = self.improve(share * weights[at])
             if done and at + 1 == len(weights):
                 return
             at += done
