@@ -103,7 +103,7 @@ class PassingRobot(RobotNode):
         self._sampled.update()
         context = self._block.GetMyMutableContextFromRoot(self._sampled.context)
         if self._doubted or not there:
-            self._block.ask(context)
+            self._block.ask(context, at_most=not there)
         cell, entry = nodes.row_of(self._sampled, self._controller, ["current_cell"])
         self.place = msg.Place(True, int(cell), max(round(entry / self.period), 0))
         rows = self._sampled.output("said")

@@ -564,6 +564,7 @@ class RobotProcess(nodes.NodeProcess):
                     ends.send(index, message)
             rest = () if node.rest is None else tuple(node.rest.tolist())
             stamp, sent = min(question.pose_stamp, question.state_stamp), self._sent()
+            stamp = stamp if number else min(stamp, time)  # A wrong clock may be ahead of the start.
             ends.send(msg.WORLD, msg.Effort(number, stamp, sent, node.state, tuple(effort.tolist()), rest))
         # What the log shows comes last: then the world knows that there is no effort if none has come.
         sent, refused = self._sent(), ends.refusals.total

@@ -206,10 +206,10 @@ class RobotWords(_Speaker):
         more[:CELL], more[CELL] = first_motion(phase), index
         more[PAST:] = np.tile([phase, 0.0, 0.0], (more.size - PAST) // PHASE_SIZE)
 
-    def ask(self, context: Context) -> None:
-        """Let the robot ask for a hold at the next sample, at least."""
+    def ask(self, context: Context, *, at_most: bool = False) -> None:
+        """Let the robot ask for a hold at the next sample, at least; ``at_most`` where its drives brake."""
         values, said = context.get_mutable_discrete_state_vector(), self._more + SAID
-        values[said] = max(values[said], float(ASKS))
+        values[said] = float(ASKS) if at_most else max(values[said], float(ASKS))
 
     def _phase(self, context: Context, later: float) -> tuple[float, float, float]:
         motion = np.array(self.kept(context)[self._more : self._more + MOTION_SIZE])
