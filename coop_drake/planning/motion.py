@@ -510,7 +510,7 @@ class _Program:
         value = float(points[-2, -1])
         value += barrier(points, weight, self.course, self.kappa, self.acting, given, slopes is not None)
         if not self.uniform:
-            value += add_times(points, 0.1 * weight, self.shortest, self.evenness, given, slopes is not None)
+            value += add_times(points, weight, self.shortest, self.evenness, given, slopes is not None)
         return value
 
     def improve(self, weight: float) -> bool:
