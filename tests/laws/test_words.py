@@ -338,6 +338,19 @@ def test_who_has_crept_to_a_start_that_is_called_off_stays_there():
     assert team.phases.tolist() == [0.7, 0.7]
 
 
+def test_a_stop_within_the_first_period_of_a_start_stands_in_the_motion_before_it():
+    team = Team(even_schedule(6), [0.0])
+    team.until(all_are(w.ARMED))
+    begin = team.motions[0, w.BEGIN]
+    team.until(lambda team: team.time > begin - team.schedule.window)
+    team.alarms[0] = w.GROWS
+    team.step()
+    hold = team.words[0, 0, w.HOLD]
+    assert 0.0 < hold <= team.schedule.period
+    assert team.kinds == [w.ARMED]
+    assert team.motions[0, w.BRAKE_AT] == pytest.approx(hold)
+
+
 def test_one_that_rests_before_the_goal_creeps_there():
     schedule = even_schedule(3)
     end = schedule.ends[-1]
