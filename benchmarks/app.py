@@ -15,7 +15,6 @@ from typer.core import TyperGroup
 from benchmarks.adversaries.measured import adversary_tasks
 from benchmarks.alarms import alarm_tasks
 from benchmarks.apart import apart_tasks, stops_tasks
-from benchmarks.breaking import breaking_tasks
 from benchmarks.commands import bench_commands, starting_tasks
 from benchmarks.compiled_runs import compiled_tasks
 from benchmarks.departures import departure_tasks
@@ -37,6 +36,7 @@ from benchmarks.questions.question import random_question
 from benchmarks.rejoining import rejoining_tasks
 from benchmarks.rows import Ledger, LedgerError
 from benchmarks.simulating import simulating_tasks
+from benchmarks.smooth import smooth_tasks
 from benchmarks.study import Study, batches_of, load_study, make_study, show_results
 from benchmarks.table import TOPICS, WHOLE, show, show_contents
 from benchmarks.tasks import Task, chosen, worked
@@ -178,7 +178,6 @@ def _tasks(effort: Effort) -> list[Task]:
         *contradiction_tasks(),
         *critical_width_tasks(),
         *starting_tasks(),
-        *breaking_tasks(),
         *alarm_tasks(),
         *(_command_task(scenario) for scenario in _COMMANDED),
         *mapping_tasks(),
@@ -188,6 +187,7 @@ def _tasks(effort: Effort) -> list[Task]:
         *compiled_tasks(),
         *adversary_tasks(),
         *message_tasks(),
+        *smooth_tasks(),
         *word_tasks(),
         *apart_tasks(),
         *rejoining_tasks(),

@@ -36,7 +36,7 @@ LATE = 0.01
 CLOCKS = 0.002
 """Error of every clock, of random sign [s]."""
 
-_DEPLOYMENT: dict[str, Any] = {"preset": "mobile_base", "budget": "all", "messages": {"delay": LATE}}
+_DEPLOYMENT: dict[str, Any] = {"preset": "mobile_base", "messages": {"delay": LATE}}
 """Departures of all runs: noise, delays, lag, wrong masses, and a fifth of the words lost."""
 
 _LIMITS = {"*": RobotLimits(1.0, 1.0, (1.0,), (2.0,))}
@@ -60,7 +60,7 @@ def _planned(
     scenario = load_scenario(team)
     scenario = replace(
         scenario,
-        deployment=deployment_of(_DEPLOYMENT),
+        deployment=deployment_of({**_DEPLOYMENT, "budget": "all" if hand_over == "pass" else "none"}),
         limits=_LIMITS,
         planner=replace(scenario.planner, hand_over=hand_over),
     )

@@ -182,7 +182,7 @@ def test_a_plan_for_another_deployment_is_read_with_a_warning(finished, tmp_path
     path, shown = write_scenario(tmp_path / "room.scenario.yaml", deployment=deployment), StringIO()
     with redirect_stdout(shown), pytest.raises(typer.Exit), reporting() as reporter:
         simulate.read_plan(read_task(path), finished[0] / "plan.json", reporter)
-    assert ("make these 17.5 ms old; `coop-drake plan`" in shown.getvalue()) == warned
+    assert ("make these 19.5 ms old; `coop-drake plan`" in shown.getvalue()) == warned
 
 
 def test_a_budget_that_ends_is_undecided(tmp_path, monkeypatch):

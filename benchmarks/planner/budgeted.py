@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
+from pydrake.systems.framework import DiagramBuilder
+
 from benchmarks.departures import deployment_of
 from benchmarks.isolated import in_own_process
 from benchmarks.planner.cases import Case
@@ -14,6 +16,7 @@ from benchmarks.rows import Row
 from benchmarks.tasks import Task
 from coop_drake.answers.budget import Budget
 from coop_drake.laws import ScheduledGains
+from coop_drake.plant import build_team_plant, planning_problem
 from coop_drake.plant.facts import budget_of
 
 CASES = ("base", "tight", "three", "elbow", "warehouse")
@@ -73,7 +76,8 @@ def plan_with_budgets(case: Case) -> dict[str, Planned]:
         case: The scenario.
     """
     scenario = replace(case.scenario(), deployment=deployment_of({"preset": "mobile_base"}))
-    problem = case.problem()
+    scenario = replace(scenario, planner=replace(scenario.planner, hand_over="pass"))
+    problem = planning_problem(scenario, build_team_plant(scenario, DiagramBuilder()))
     budgets: dict[str, Budget | None] = {
         label: None if choice is None else budget_of(choice, scenario, problem)
         for label, choice in BUDGETS.items()

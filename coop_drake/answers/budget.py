@@ -11,7 +11,6 @@ import numpy as np
 from coop_drake.tree.component_tree import BODY, Bodies
 from coop_drake.typed_data import (
     EXACT,
-    Bound,
     DataError,
     Limits,
     NotNegative,
@@ -166,6 +165,11 @@ class Budget:
         return 2.0 * self.clock_error
 
     @property
+    def words_window(self) -> float:
+        """W, the time in which what one robot says is used by all [s], see ``laws/words.py``."""
+        return self.report_age + 2.0 * self.clock_error + 2.0 * self.period
+
+    @property
     def rubs(self) -> bool:
         """Whether joints have friction."""
         return self.joint_coulomb > 0.0 or self.joint_viscous > 0.0
@@ -188,169 +192,39 @@ class Budget:
 
 
 @dataclass(frozen=True)
-class Tolerance:
-    """What follows from a budget in one transition, per axis (theta, q...), arrays of shape (1 + n,).
+class Departures:
+    """How far a team may depart from its motion under a plan's budget.
 
-    Entry sets are those of the nominal motions.
+    Rows are of the position, as a vector's length, then of theta and q, each of shape (2 + n,).
 
     Attributes:
-        age_factor: The gains are those of the gain set for this many times the age of its commands [-].
-        rate_share: They are those for this share of the limits of rates, 1 where there are none [-].
-        entry_lower: Lowest position at the entry [rad or m].
-        entry_upper: Highest position at the entry [rad or m].
-        entry_rate_lower: Lowest rate at the entry [rad/s or m/s].
-        entry_rate_upper: Highest rate at the entry [rad/s or m/s].
-        entry_acceleration: Largest magnitude of acceleration and command at the entry [rad/s^2 or m/s^2].
-        distance: Least distance of the axis to the funnel's bounds at all times [rad or m].
-        acceleration: Largest magnitude of the nominal acceleration [rad/s^2 or m/s^2].
-        settled: Largest distance of the nominal motion from the goal interval's middle in the end [rad or
-            m].
-        settled_rate: Largest nominal rate in the end [rad/s or m/s].
-        departure: Largest departure of the axis from its nominal motion [rad or m].
-        rate_departure: Largest departure of its rate from the nominal one [rad/s or m/s].
-        alarm_times: Times since the entry from which levels hold, the first one 0, shape (stages,) [s].
-        alarm: Of every stage the levels above which a measured departure of an axis is an alarm, each of
-            shape (1 + n,) [rad or m].
-        ahead_alarm: The same for where its rate takes it until a report is used that knows of it, see
-            ``laws/readiness.py`` [rad or m].
-        rate_alarm: The same for its rate, in all stages [rad/s or m/s].
-        entry_parts: Into how many parts the positions at the entry are cut, so that these bounds follow [-].
+        pull: Largest part of a command that pulls the team to its motion [m/s^2, rad/s^2].
+        position: Largest departure of positions and angles [m, rad].
+        rate: Largest departure of rates [m/s, rad/s].
+        acceleration: Largest departure of accelerations [m/s^2, rad/s^2].
+        ahead: Largest departure to which rates take the team until a robot knows of it [m, rad].
+        rest: Largest departure of positions and angles where the motion rests [m, rad].
+        alarm: Levels above which a measured departure is an alarm [m, rad].
+        rate_alarm: The same for rates [m/s, rad/s].
+        ahead_alarm: The same for where rates take the team [m, rad].
+        room: Distance that the motion keeps from the boundaries of the cells [m, rad].
+        usual_rate: What random noise, of which the budget states three standard deviations, rarely exceeds of
+            departures of rates; with it limits of speed are kept [m/s, rad/s].
+        usual_acceleration: The same of accelerations, by noise alone [m/s^2, rad/s^2].
         effort: Largest efforts that robots are told to give: the forces of all bases, their torques, then the
             efforts of all joints; empty where the budget limits none [N, N m].
     """
 
-    age_factor: Annotated[Positive, EXACT]
-    rate_share: Annotated[float, Limits(above=0.0, at_most=1.0), EXACT]
-    entry_lower: Vector
-    entry_upper: Vector
-    entry_rate_lower: Vector
-    entry_rate_upper: Vector
-    entry_acceleration: Vector
-    distance: Vector
+    pull: Vector
+    position: Vector
+    rate: Vector
     acceleration: Vector
-    settled: Vector
-    settled_rate: Vector
-    departure: Vector
-    rate_departure: Vector
-    alarm_times: Vector
-    alarm: tuple[Vector, ...]
-    ahead_alarm: tuple[Vector, ...]
+    ahead: Vector
+    rest: Vector
+    alarm: Vector
     rate_alarm: Vector
-    entry_parts: tuple[Annotated[int, Limits(at_least=1, at_most=64)], ...]
+    ahead_alarm: Vector
+    room: Vector
+    usual_rate: Vector
+    usual_acceleration: Vector
     effort: Vector = field(default_factory=lambda: np.zeros(0))
-
-
-# The position's part of a budget: how far the object may depart from its nominal motion.
-
-
-@dataclass(frozen=True)
-class PositionTube:
-    """The tube about the nominal motion of the object's origin, the same in every transition of a plan.
-
-    Attributes:
-        tracking_stiffness: K_t, with which robots pull the object to its nominal motion [1/s^2].
-        tracking_damping: zeta_t, likewise for velocities [1/s].
-        speed: Largest speed of p_G [m/s].
-        radius: r, largest distance of the object's origin from its nominal position [m].
-        rate: Largest departure of its velocity from the nominal one [m/s].
-        velocity: Largest speed of the object's origin [m/s].
-        rest: Largest distance from the nominal position after both have come to rest [m].
-        acceleration: Largest acceleration that a robot commands for the object's origin, times the factor by
-            which its masses may be too large: its forces over the true mass [m/s^2].
-        ahead: Largest distance e + t e' to which its departures e and e' at a sample would take it within the
-            time t for which nobody may know of them, see ``laws/readiness.py`` [m].
-    """
-
-    tracking_stiffness: Bound
-    tracking_damping: Bound
-    speed: Bound
-    radius: _Exact
-    rate: _Exact
-    velocity: _Exact
-    rest: _Exact
-    acceleration: _Exact
-    ahead: _Exact
-
-
-# The axes' part of a budget: with which gains angles and joints are pulled to their nominal motions.
-
-
-QUINTIC_FUNNELS = "quintic funnels, version 1"
-"""The law of nominal axes for which sets are stated and checked, with the version of its formulas."""
-
-
-@dataclass(frozen=True)
-class AxisTracking:
-    """Gains of the pull, the same for all axes and in every transition of a plan.
-
-    Attributes:
-        stiffness: K_a [1/s^2].
-        damping: zeta_a [1/s].
-        rate: Of every axis (theta, q...) a rate that it never exceeds, nominal rate and departure together,
-            with which an error of the age of measurements and viscous friction count; empty where no clock is
-            wrong and no friction is viscous [rad/s or m/s].
-        acceleration: The same of its acceleration [rad/s^2 or m/s^2].
-        disturbance: Of the object's origin, then of every axis, the largest acceleration that friction of
-            joints causes; empty where there is none [m/s^2, rad/s^2 or m/s^2].
-        law: Name and version of the law that commands nominal axes; the sets hold for this one.
-    """
-
-    stiffness: Bound
-    damping: Bound
-    rate: tuple[Bound, ...] = ()
-    acceleration: tuple[Bound, ...] = ()
-    disturbance: tuple[_Exact, ...] = ()
-    law: str = QUINTIC_FUNNELS
-
-
-# The levels above which a measured departure from the nominal motion is an alarm.
-
-
-@dataclass(frozen=True)
-class Alarms:
-    """The levels that all transitions of a plan with a budget have in common, see ``laws/readiness.py``.
-
-    Those of angles and joints stand in every transition's ``tolerance``.
-
-    Attributes:
-        position: Of the object's measured position, the length of the vector [m].
-        velocity: Of its measured velocity, likewise [m/s].
-        ahead: Of where both together take it until a report is used that knows of it, likewise [m].
-        grasp: Of the distance of a grasp from where the measured pose of the base has it; null where the
-            budget has no such error [m].
-        turn: Of the measured angle of a base, likewise [rad].
-    """
-
-    position: Bound
-    velocity: Bound
-    ahead: Bound
-    grasp: Bound | None = None
-    turn: Bound | None = None
-
-
-# From which rests a cell can be begun anew under a plan's budget.
-
-
-@dataclass(frozen=True)
-class Restart:
-    """What a team that begins its current cell anew from rest keeps to, and how far it then departs.
-
-    All axes go slowly to the middle of their goal intervals while the object's position rests, see
-    ``laws/actuators.py``. A cell can be begun anew from a rest in which every axis is inside its slice by
-    more than its departure here, and the object inside the governed region: then every axis stays in its
-    slice, and the object in its tube.
-
-    Attributes:
-        rate: Largest nominal rate on the way [rad/s or m/s].
-        acceleration: Largest nominal acceleration on the way [rad/s^2 or m/s^2].
-        rest_rate: Largest true rate of an axis that is taken for resting [rad/s or m/s].
-        wait: For how long after the way no cell is left, so that nothing of the way is left in the loops [s].
-        departures: Largest departure of every axis in every cell, from the nominal motion on the way, each of
-            shape (1 + n,) [rad or m].
-    """
-
-    rate: Bound
-    acceleration: Bound
-    rest_rate: _Exact
-    wait: Bound
-    departures: tuple[Vector, ...]

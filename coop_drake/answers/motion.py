@@ -43,6 +43,8 @@ Windows = Annotated[FloatArray, Codec(tuple[tuple[Number, Number], ...], np.arra
 
 Gains = tuple[Annotated[Positive, EXACT], Annotated[Positive, EXACT]]
 
+TeamGains = tuple[Gains, Gains]
+
 ControlPoints = Annotated[FloatArray, Codec(tuple[tuple[Number, ...], ...], _read_rows, np.ndarray.tolist)]
 
 
@@ -78,7 +80,7 @@ class Motion:
     waiting: Annotated[NotNegative, EXACT]
     ramp: Annotated[Positive, EXACT]
     start_rate: Annotated[Positive, EXACT]
-    gains: tuple[Gains, Gains]
+    gains: TeamGains
 
     @property
     def duration(self) -> float:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import numpy as np
 from shapely import Point, Polygon
 
-from coop_drake.answers.budget import Alarms, AxisTracking, Budget, PositionTube, Restart, Tolerance
+from coop_drake.answers.budget import Budget, Departures
 from coop_drake.answers.document import (
     Document,
     Points,
@@ -177,9 +177,8 @@ class Transition:
         only_angles: True where the position is already at the target and only angles move.
         gains: Gains of the governor and of the funnels.
         path: Such a path from where the cell is entered to the target, shape (k, 2) [m].
-        tolerance: What follows from the plan's budget for the axes; null in a plan without one for them.
-        governed: Region in which p_G and the object's nominal motion stay: the cell less a strip as wide as
-            the plan's position tube; null in a plan without a tube [m].
+        governed: Region in which the motion of a plan with a budget stays: the cell less a strip for
+            departures; null in a plan without one [m].
     """
 
     target: Vector
@@ -192,7 +191,6 @@ class Transition:
     only_angles: bool
     gains: TransitionGains
     path: Points
-    tolerance: Tolerance | None = None
     governed: Region | None = None
 
 
@@ -209,20 +207,14 @@ class Plan:
         goal_joints: Goal of each joint, None where free; of joints without limits unwrapped along the plan.
         cells: From the start's cell to the goal's.
         transitions: One for each cell, in the same order.
-        budget: Departures from the ideal team under which the object provably stays in its cells, and every
-            axis in its funnel if the budget says so; null if none were asked for.
-        tube: How far the object may depart from its nominal motion under the budget; null without one.
-        axis_tracking: How angles and joints are pulled to their nominal motions; null in a plan without a
-            budget for them.
+        budget: Departures from the ideal team under which object and axes provably stay in their cells; null
+            if none were asked for.
         speeds: Limits of speed that are kept, and what follows for the bases; null where no limit is known.
         age_factor: The gains are those of the gain set for so many times the age of its commands, so that
             limits of acceleration are kept.
-        alarms: Levels above which measured departures from the nominal motion are alarms; null without a
-            budget.
         refused_by: Limits of the scenario that the plan breaks: it shows that a way exists, but cannot be
             carried out. Empty for a plan that can.
-        restart: From which rests a cell can be begun anew under the budget; null in a plan without one for
-            angles and joints.
+        departures: How far a team that follows the motion departs from it under the budget; null without one.
         motion: The nominal motion of a team that passes from cell to cell without a stop; null for one that
             comes to rest in every cell.
     """
@@ -237,16 +229,13 @@ class Plan:
     transitions: tuple[Transition, ...]
     budget: Budget | None = None
     speeds: SpeedStatement | None = None
-    tube: PositionTube | None = None
     age_factor: Annotated[Positive, EXACT] = 1.0
-    axis_tracking: AxisTracking | None = None
-    alarms: Alarms | None = None
     refused_by: tuple[Refusal, ...] = ()
-    restart: Restart | None = None
+    departures: Departures | None = None
     motion: Motion | None = None
 
     def governed(self, index: int) -> Polygon:
-        """Return the region to which the governor keeps p_G in a cell: Q_i, or less where there is a tube."""
+        """Return the region in which p_G or the motion stays in a cell: Q_i, or less under a budget."""
         return self.transitions[index].governed or self.cells[index].tidied
 
     def governor_row(self, index: int) -> Vector:
@@ -344,11 +333,8 @@ def table_1(plan: Plan) -> str:
 FORMAT = "coop_drake plan"
 """What the document says it is."""
 
-VERSION = 5
+VERSION = 6
 """Version of its layout; another one is refused."""
-
-OTHERWISE_LONG = ("effort", "alarm_times", "alarm", "ahead_alarm")
-"""Lists of a transition that have another number of entries than there are axes."""
 
 
 def save_plan(plan: Plan, path: Path | str) -> Path:
@@ -410,30 +396,14 @@ def read_plan(document: Document) -> Plan:
         document.check_intervals(f"transitions[{k}].goal_", axes)
         document.check_length(f"transitions[{k}].target", 2)
         gains = document.entry(f"transitions[{k}].gains")
-        parts = {"gains": gains, "gains.rest": gains.get("rest")}
-        parts["tolerance"] = document.entry(f"transitions[{k}]").get("tolerance")
-        for part, content in parts.items():
-            for name, value in (content or {}).items():
-                if isinstance(value, list) and name not in OTHERWISE_LONG:
-                    document.check_length(f"transitions[{k}].{part}.{name}", axes)
-        if parts["tolerance"] is not None:
-            _check_levels(document, f"transitions[{k}].tolerance", axes)
+        for name, value in gains.items():
+            if isinstance(value, list):
+                document.check_length(f"transitions[{k}].gains.{name}", axes)
     if plan.motion is not None:
         document.check_length("motion.points[0]", 2 + axes)
         document.check_length("motion.windows", len(plan.cells))
         document.check_length("motion.rates", len(plan.cells))
     return plan
-
-
-def _check_levels(document: Document, where: str, axes: int) -> None:
-    """Refuse levels of axes that are not as many as the stages and the axes."""
-    times = document.entry(f"{where}.alarm_times")
-    if not times:
-        document.refuse(f"{where}.alarm_times", times, "at least one time")
-    for name in ("alarm", "ahead_alarm"):
-        document.check_length(f"{where}.{name}", len(times))
-        for i in range(len(times)):
-            document.check_length(f"{where}.{name}[{i}]", axes)
 
 
 # What every executable plan satisfies: targets shared by neighbours, goals inside slices.
@@ -548,7 +518,7 @@ def other_age(plan: Plan, gain_set: GainSet | None) -> str:
     if not isinstance(gain_set, ScheduledGains):
         return ""
     first = plan.transitions[0]
-    factor = plan.age_factor * (1.0 if first.tolerance is None else first.tolerance.age_factor)
+    factor = plan.age_factor
     expected = min(gain_set.age_phase / (factor * gain_set.age), gain_set.max_rate_gain)
     if isclose(first.gains.rate_gain, expected, rel_tol=_SAME_GOAL):
         return ""

@@ -223,7 +223,7 @@ class Ready(Message, frozen=True):
 
 
 class HoldRequest(Message, frozen=True):
-    """A robot's request that the team be held, in every period where a scenario has holds or a plan a budget.
+    """A robot's request that the team be held, in every period where a scenario has holds.
 
     Attributes:
         asks: Whether it asks for a hold.
@@ -247,7 +247,7 @@ class Switch(Message, frozen=True):
 
 
 class Hold(Message, frozen=True):
-    """The supervisor's bit, in every period where a scenario has holds or a plan a budget.
+    """The supervisor's bit, in every period where a scenario has holds.
 
     Attributes:
         held: Whether the team is held.

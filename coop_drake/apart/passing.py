@@ -88,10 +88,6 @@ class PassingRobot(RobotNode):
         if not self.place.known:
             self._take_over()
 
-    def instant(self, time: float, sample: int) -> float:
-        """Return the time for which the robot computes a sample: what its clock shows [s]."""
-        return time
-
     def _act(self, time: float, measured: FloatArray, *, stopped: bool) -> tuple[FloatArray, Said]:
         """Hear, decide, compute the effort, and speak."""
         if not self.place.known:

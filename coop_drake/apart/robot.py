@@ -22,9 +22,6 @@ from coop_drake.diagram.robot_controller import RobotKnowledge, build_robot_cont
 from coop_drake.laws import actuators
 from coop_drake.laws.axis_table import GOAL_LOWER, GOAL_UPPER, SLICE_LOWER, SLICE_UPPER, track_row
 from coop_drake.laws.measurements import period_of, whole_periods
-from coop_drake.laws.motion import place_on_axes
-from coop_drake.laws.readiness import BRAKES
-from coop_drake.laws.robot_dynamics import PX, PY, motion_room, write_motion
 from coop_drake.plant import robot_chain
 from coop_drake.plant.chain import is_circle
 from coop_drake.scenario import Deployment
@@ -207,17 +204,6 @@ class RobotNode:
         """Tell the supervisor again what holds: it may be another process, which has heard nothing yet."""
         self._said, self._reported, self._told_rest = msg.Ready(self.place.cell, False), inf, -inf
 
-    def instant(self, time: float, sample: int) -> float:
-        """Return the time for which the robot computes a sample [s].
-
-        Nominal motions must be the same in all robots, whatever their clocks show: they count samples.
-
-        Args:
-            time: What the robot's clock shows [s].
-            sample: Number of the sample.
-        """
-        return time if self._plan.budget is None else sample * self.period
-
     def look(self, time: float, measured: FloatArray) -> FloatArray:
         """Return the robot's record for the log at an instant; nothing changes.
 
@@ -248,7 +234,6 @@ class RobotNode:
         """
         self._number = period_of(time, self.period) if sample is None else sample
         doubts = stamps is not None and self._stamps.doubts(self._number, time, stamps)
-        time = self.instant(time, self._number)
         self._doubted = self._doubted + 1 if doubts else 0
         held = self._held or self._plan.motion is not None
         longest = whole_periods(LONGEST_DOUBT, self.period) if held else 0
@@ -267,11 +252,9 @@ class RobotNode:
         if self._slow is not None and not self._has_come(self._slow, time):
             return self._go_slowly(self._slow, time, measured), self._requests()
         self._sampled.at(time, self._inputs(measured))
-        brakes = self._monitored and nodes.row_of(self._sampled, self._controller, ["alarm"])[0] >= BRAKES
         self._sampled.update()
         held = self._held and self._hold_message[0] > 0.0
-        self.state = nodes.STANDS if brakes else nodes.HOLDS if held else nodes.FOLLOWS
-        self.rest = self._rest()
+        self.state = nodes.HOLDS if held else nodes.FOLLOWS
         return self._sampled.output("robot_effort"), self._messages()
 
     def hear_from(self, sender: int, message: Any) -> None:
@@ -316,41 +299,25 @@ class RobotNode:
         return False
 
     def _begin(self, order: msg.Begin, time: float, measured: FloatArray) -> None:
-        """Begin the cell of an order anew: set all states to rest, and choose the way.
-
-        From a rest outside the cell the robot returns to it, which no plan has proved free.
-        """
+        """Begin the cell of an order anew: set all states to rest, and choose a way that no plan proves."""
         pose, joints = np.array(order.object_pose), self._still.mean()[: self._joints]
         pose[2] += whole_turns(pose[2:], self._near[:1])[0]
         axes, table = np.array([pose[2], *joints]), self._tables[order.cell]
-        way = self._way(order.cell, axes, pose[:2])
-        certified = self._holds(order.cell, axes, pose[:2]) and order.slow >= way
-        target = pose[:2] if certified else self._inside(order.cell, pose[:2])
+        target = self._inside(order.cell, pose[:2])
         middle = 0.5 * (table[:, GOAL_LOWER] + table[:, GOAL_UPPER])
         ends = np.stack([axes, middle]), np.stack([pose[:2], target])
         self._slow = SlowMotion(order.sample, order.slow, *ends)
-        self.state = nodes.FOLLOWS if certified else nodes.RETURNS
-        wait = self._plan.restart.wait if self._plan.restart else 0.0
-        self._stays_until = order.sample + order.slow + whole_periods(wait, self.period)
+        self.state, self._stays_until = nodes.RETURNS, order.sample + order.slow
         self._sampled.at(time, self._inputs(measured))
         self._deployed.begin(self._sampled.context, order.cell, pose, joints)
         self._said, self._reported, self._told_rest = msg.Ready(order.cell, False), inf, -inf
 
-    def _holds(self, cell: int, axes: FloatArray, position: FloatArray) -> bool:
-        """Whether the plan states that a cell can be begun anew from a rest, see ``answers/budget.py``."""
-        restart = self._plan.restart
-        if restart is None or self._knowledge.cells[cell].clearance(position) < 0.0:
-            return False
-        table, departure = self._tables[cell], restart.departures[cell][self._axes]
-        inside = np.minimum(axes - table[:, SLICE_LOWER], table[:, SLICE_UPPER] - axes)
-        return bool((inside >= departure).all())
-
     def _way(self, cell: int, axes: FloatArray, position: FloatArray) -> int:
         """Return for how many samples the robot goes slowly from a rest."""
-        table, restart = self._tables[cell], self._plan.restart
+        table = self._tables[cell]
         way = np.abs(axes - 0.5 * (table[:, GOAL_LOWER] + table[:, GOAL_UPPER])).max()
         way = max(float(way), float(np.hypot(*(self._inside(cell, position) - position))))
-        return actuators.slow_samples(way, self.period, restart.rate / actuators.RATE if restart else 1.0)
+        return actuators.slow_samples(way, self.period, 1.0)
 
     def _inside(self, cell: int, position: FloatArray, room: float = 0.0) -> FloatArray:
         """Return the point of a governed region, less a strip, that is nearest to a position [m]."""
@@ -381,10 +348,8 @@ class RobotNode:
         if self._number - self._told_rest < whole_periods(nodes.AGAIN, self.period):
             return []
         self._told_rest = self._number
-        near = [c for c in range(self.place.cell - 1, self.place.cell + 2) if 0 <= c < len(self._tables)]
-        cells = tuple(cell for cell in near if self._holds(cell, axes, position))
-        needed = max(self._way(cell, axes, position) for cell in {*cells, self.place.cell})
-        return [msg.AtRest(self._number, cells, needed, tuple(float(part) for part in mean[-3:]))]
+        needed = self._way(self.place.cell, axes, position)
+        return [msg.AtRest(self._number, (), needed, tuple(float(part) for part in mean[-3:]))]
 
     def _has_come(self, slow: SlowMotion, time: float) -> bool:
         """Whether the slow way is over: from now on the cell's law acts, with funnels that are closed."""
@@ -402,54 +367,20 @@ class RobotNode:
         released = {"hold_message": held * [0, 1]} if self._held else {}
         self._sampled.at(time, self._inputs(measured) | released)
         x, v = self._moving(root, measured)
-        lag = self._plan.budget.lag if self._plan.budget else 0.0
         wanted, rate, _ = actuators.slow_motion(slow.axes, since, duration)
-        ahead = actuators.slow_motion(slow.axes, since + 0.5 * T + lag, duration)[2]
+        ahead = actuators.slow_motion(slow.axes, since + 0.5 * T, duration)[2]
         command = ahead - actuators.PULL[0] * (x - wanted) - actuators.PULL[1] * (v - rate)
         own = [track_row(row, 0.0, *state)[0] for row, *state in zip(table, x, v, strict=True)]
         self._deployed.command_axes(root, self.place.cell, command - own)
-        if self._monitored and self.state == nodes.FOLLOWS:
-            brakes = nodes.row_of(self._sampled, self._controller, ["alarm"])[0] >= BRAKES
-            self.state = nodes.STANDS if brakes else nodes.FOLLOWS
         self._sampled.update()
         self._deployed.keep_position(root, actuators.slow_motion(slow.position, since + T, duration)[0])
-        self.rest = self._rest()
         return self._sampled.output("robot_effort")
 
     def _moving(self, root: Context, measured: FloatArray) -> FloatArray:
-        """Return angle and joints, then their rates, nominal ones or as measured, shape (2, 1 + n)."""
-        nominal = self._deployed.nominal_axes(root)
-        if nominal is not None:
-            return nominal
+        """Return angle and joints, then their rates, as measured, shape (2, 1 + n)."""
         n, rate = self._joints, self._sampled.output("object_state")[5]
         joints, rates = measured[3 : 3 + n], measured[6 + n : 6 + 2 * n]
         return np.array([[measured[-1], *joints], [rate, *rates]])
-
-    def _rest(self) -> FloatArray | None:
-        """Return where the robot's drives shall bring it if they brake now: where its nominal motion is.
-
-        Axes keep away from the ends of their slices, and the object from the boundary of its region, by as
-        much as a rest needs from which the cell can be begun anew.
-        """
-        root, restart, cell = self._sampled.context, self._plan.restart, int(self._cell[0])
-        axes, position = self._deployed.nominal_axes(root), self._deployed.nominal_position(root)
-        if axes is None or position is None or restart is None or self._knowledge.axis_motion is None:
-            return None
-        lower, upper = self._tables[cell][:, SLICE_LOWER], self._tables[cell][:, SLICE_UPPER]
-        inner = np.minimum(restart.departures[cell][self._axes] + ROOM, 0.5 * (upper - lower))
-        axes[0] = np.clip(axes[0], lower + inner, upper - inner)
-        away = self._inside(cell, position, ROOM)
-        position = away if np.hypot(*(away - position)) <= 3.0 * ROOM else position
-        state = np.zeros(self.state_size)
-        place_on_axes(axes, self._knowledge.axis_motion.mounting, state)
-        half, (c, s) = 3 + self._joints, (np.cos(axes[0, 0]), np.sin(axes[0, 0]))
-        motion = motion_room(self._chain)
-        write_motion(self._chain, np.array([*state[:half], *np.zeros(half)]), motion)
-        hand = motion[-1]
-        p_LE = self._knowledge.p_LE
-        state[0] = position[0] + c * p_LE[0] - s * p_LE[1] - hand[PX]
-        state[1] = position[1] + s * p_LE[0] + c * p_LE[1] - hand[PY]
-        return state[:half]
 
     def _messages(self) -> Said:
         """Return what is new: a report only where the supervisor would come to another conclusion by it.
@@ -554,7 +485,7 @@ class RobotProcess(nodes.NodeProcess):
         ends.sample = number
         self._say_place()
         self._say_again()
-        shown = tuple(node.look(node.instant(time, number) if question.step else time, measured).tolist())
+        shown = tuple(node.look(time, measured).tolist())
         if question.step:
             effort, said = self._steps(question, measured)
             for message in said:

@@ -21,7 +21,7 @@ def check(question: Any, answer: Any, progress: Any = lambda phase, share: None)
     not or is not shown in the allowed steps, or a document is not as the format says.
     """
     formats = {
-        ("coop_drake plan", 5): (check_plan, "cells"),
+        ("coop_drake plan", 6): (check_plan, "cells"),
         ("coop_drake proof of infeasibility", 4): (check_proof, "slices"),
     }
     try:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from functools import partial
 from typing import TYPE_CHECKING
 
-import typer
 from rich.markup import escape
 
 from coop_drake.cli.options import BudgetName, Effort, GainsName, ResultsFolder, ScenarioPath
@@ -74,8 +73,6 @@ def answer_to(
     from coop_drake.planning.planner import plan
 
     name, tolerated = task.scenario.selected_gains, None
-    if budget is not None and task.scenario.planner.hand_over == "pass":
-        raise typer.BadParameter("--budget needs planner.hand_over: rest.")
     if budget is not None or task.scenario.deployment.budget != "none":
         from coop_drake.plant.facts import budget_of
 

@@ -153,13 +153,11 @@ def planning_facts(result: PlanningResult) -> dict[str, Any]:
 def plan_facts(plan: Plan) -> dict[str, Any]:
     """Return the size of a plan and what it promises."""
     budgeted: dict[str, Any] = {}
-    if plan.budget is not None and plan.tube is not None:
+    if plan.budget is not None and plan.departures is not None:
         covered = "position, angles and joints" if plan.budget.axes else "the position, not angles and joints"
-        budgeted = {"budget_holds_for": covered, "tube_radius_m": plan.tube.radius}
-        efforts = [one.tolerance.effort for one in plan.transitions if one.tolerance is not None]
+        budgeted = {"budget_holds_for": covered, "tube_radius_m": float(plan.departures.position[0])}
         if plan.budget.base_force is not None:
-            forces = [effort[: plan.budget.robots].max() for effort in efforts]
-            budgeted["budget_base_force_n"] = float(max(forces))
+            budgeted["budget_base_force_n"] = float(plan.departures.effort[: plan.budget.robots].max())
     return {
         **budgeted,
         "cells": len(plan.cells),

@@ -15,7 +15,6 @@ from coop_drake.laws.departures import WorldDepartures
 from coop_drake.laws.robot_dynamics import MOTION_COLUMNS
 from coop_drake.laws.team_dynamics import StickingRoom, TeamWork, sticking_room, team_work
 from coop_drake.laws.words import Schedule
-from coop_drake.systems.kernels import NOMINAL_SIZE
 from coop_drake.tree.arrays import FloatArray, IntArray
 from coop_drake.tree.component_tree import TeamArrays
 
@@ -65,7 +64,6 @@ class LoopTeam(NamedTuple):
         base_chains: From the object to every robot's base.
         yaws: Angle of every base in the object where all joints are at zero, shape (N,) [rad].
         loads: What ``end_effector_command`` takes of every robot, shape (N, 7).
-        tracking: K, zeta, K_t and zeta_t where the position tracks a nominal motion, else of shape (0,).
     """
 
     places: IntArray
@@ -74,7 +72,6 @@ class LoopTeam(NamedTuple):
     base_chains: FloatArray
     yaws: FloatArray
     loads: FloatArray
-    tracking: FloatArray
 
 
 class LoopPlant(NamedTuple):
@@ -102,7 +99,7 @@ class LoopPlant(NamedTuple):
 
 
 class LoopNominal(NamedTuple):
-    """The nominal motion of a team that passes, and those of a plan with a budget, (0,) where there are none.
+    """The nominal motion of a team that passes, and what its budget states; of no size where there is none.
 
     Attributes:
         schedule: When cells are begun and left; of no cells where the team rests in every cell.
@@ -110,19 +107,12 @@ class LoopNominal(NamedTuple):
         span: Time of a span of it [s].
         gains: K_t [1/s^2] and zeta_t [1/s] of the position, then of the axes, shape (4,).
         ahead: How long after a sample its efforts act on average, T / 2 and the lag that robots know [s].
-        flow: What ``nominal_flow`` gives, of shape (0, 0) where p_G follows the measured position.
-        position: Largest speed of p_G [m/s], for how many periods a report is used [-], the radius of the
-            tube [m], and the largest departure of the velocity [m/s], shape (4,).
-        axis_gains: K_a [1/s^2], zeta_a [1/s] and the lag of the nominal axes [s], shape (3,) or (0,).
         mountings: Those of all robots, see ``place_on_axes``, shape (M,).
         levels: Of the robots' monitors, see ``largest_departure``, shape (5,) or (0,).
         unseen: t there [s].
-        axis_alarms: Levels of all axes, of their rates and of where both take them in every stage of every
-            cell, shape (C, stages, 3, M) or (C, stages, 3, 0).
-        alarm_times: Times since a cell's entry at which its stages begin, shape (C, stages) [s].
-        distances: Least distances of (theta, q) to the bounds of their funnels that the budget states for
-            every cell, then their largest departures and those of their rates, shape (3, C, 1 + n) or
-            (0, 0, 0) [rad or m, and per s].
+        axis_alarms: Levels of all axes, of their rates and of where both take them, (3, M) or (3, 0).
+        stated: Largest departures from the motion of the position, theta and q that the budget states, then
+            those of their rates, shape (2, 2 + n) or (0, 0) [m, rad, and per s].
     """
 
     schedule: Schedule
@@ -130,15 +120,11 @@ class LoopNominal(NamedTuple):
     span: float
     gains: FloatArray
     ahead: float
-    flow: FloatArray
-    position: FloatArray
-    axis_gains: FloatArray
     mountings: FloatArray
     levels: FloatArray
     unseen: float
     axis_alarms: FloatArray
-    alarm_times: FloatArray
-    distances: FloatArray
+    stated: FloatArray
 
 
 class LoopDepartures(NamedTuple):
@@ -192,8 +178,6 @@ class LoopMemory(NamedTuple):
             states, shape (2, 3 N + 2 (3 N + n)).
         lines: Lines of measured poses, then of states, of every robot, shape (N, 2, rows, 1 + size).
         governors: p_G of every robot, shape (N, 2) [m].
-        nominal: p^, p^' and p_G, ring (D, 6).
-        axes: x^, x^' and a^ of all axes, ring (D, 3, M).
         jumps: What fades, shape (M,).
         jumped: To which cell every robot's jumps belong, shape (N,).
         recent: Poses and own joints that robots measured at the last samples in the last cell, infinite
@@ -207,7 +191,8 @@ class LoopMemory(NamedTuple):
             ``WORD_SIZE``); this and the next four of a team that passes, else of shape (0, ...).
         said: What they said, ring (R, N + 1, ``WORD_SIZE``).
         motions: Of all robots, see ``phase_at``, shape (N, ``MOTION_SIZE``).
-        phases: Their phases [s] and paces [-] at the last samples, ring (D, N, 2).
+        phases: Their phases [s] and paces [-] at the last samples, and those by a clock without error, ring
+            (D, N, 4).
         supervised: What the supervisor sees, see ``supervisor_step``, how often the team came to rest on its
             way, and whether it moves along it, shape (4,).
     """
@@ -219,8 +204,6 @@ class LoopMemory(NamedTuple):
     exact: FloatArray
     lines: FloatArray
     governors: FloatArray
-    nominal: FloatArray
-    axes: FloatArray
     jumps: FloatArray
     jumped: FloatArray
     recent: FloatArray
@@ -247,22 +230,20 @@ class RobotRoom(NamedTuple):
 
     Attributes:
         pose: The object's pose as the robot knows it, shape (3,).
-        seen: The object's state as the robot knows it, then on the nominal axes of now, and of when efforts
-            act, shape (3, 6).
-        robots: The robot's own state in the same three ways, shape (3, 2 (3 + n)).
-        governed: p_G' as the robot moves its own p_G, zero where a nominal motion leads, then the desired
+        seen: The object's state as the robot knows it, then with the angle of the motion when efforts act,
+            shape (2, 6).
+        robots: The robot's own state in the same two ways, shape (2, 2 (3 + n)).
+        governed: p_G' as the robot moves its own p_G, zero where the team passes, then the desired
             acceleration of the object's origin, shape (4,) [m/s, m/s^2].
         told: What every robot tells the log, see ``TOLD``, shape (N, ``TOLD``).
         law: What the law of all axes asks for, shape (M,).
-        pulled: That of the robot's with the pull to the nominal motion, shape (M,).
-        later: Nominal axes when efforts act, shape (3, M).
         fading: The jumps of the robot's axes that fade in the cell, shape (M,).
         held: Efforts before the sample, shape (3 N + n,) [N, N m].
         errors: Of one measurement, shape (2 (3 + n),).
         line: A line of measurements, then what is measured, shape (rows + 1, 1 + size).
         arrivals: What a channel of reports holds next, of its shape.
         motion: Motion of the longest chain, see ``motion_room``.
-        shown: What ``show_nominal`` writes, shape (6,).
+        departing: The object's state less its velocity along the motion, shape (6,).
         then: The motion of a team that passes when what the robot knows was measured, shape (3, 3 + n).
         ahead: That when efforts act, of the same shape.
         columns: Where (x, y, theta, q) stand in it, shape (3 + n,).
@@ -277,15 +258,13 @@ class RobotRoom(NamedTuple):
     governed: FloatArray
     told: FloatArray
     law: FloatArray
-    pulled: FloatArray
-    later: FloatArray
     fading: FloatArray
     held: FloatArray
     errors: FloatArray
     line: FloatArray
     arrivals: FloatArray
     motion: FloatArray
-    shown: FloatArray
+    departing: FloatArray
     then: FloatArray
     ahead: FloatArray
     columns: IntArray
@@ -298,10 +277,10 @@ def robot_room(team: LoopTeam, memory: LoopMemory) -> RobotRoom:
     """Return room for the robots of a team."""
     M, state, line = memory.jumps.size, memory.state.size, memory.lines.shape[2:]
     return RobotRoom(
-        np.empty(3), np.empty((3, 6)), np.empty((3, state)), np.empty(4), np.empty((team.yaws.size, TOLD)),
-        np.empty(M), np.empty(M), np.empty((3, M)), np.empty(M),
+        np.empty(3), np.empty((2, 6)), np.empty((2, state)), np.empty(4), np.empty((team.yaws.size, TOLD)),
+        np.empty(M), np.empty(M),
         np.empty(memory.efforts.shape[1]), np.empty(state), np.empty((line[0] + 1, line[1])),
-        np.empty(memory.channels.shape[1:]), _longest_motion(team), np.empty(NOMINAL_SIZE),
+        np.empty(memory.channels.shape[1:]), _longest_motion(team), np.empty(6),
         np.empty((3, state // 2)), np.empty((3, state // 2)), np.arange(state // 2), np.empty(state // 2),
         np.empty(4), np.empty((2, M)),
     )  # fmt: skip
@@ -370,6 +349,7 @@ class WatchRoom(NamedTuple):
         vertices: Room for the vertices in W, shape (V, 2) [m].
         discs: Room for the discs in W, shape (P, 3) [m].
         nominal: Where every robot's motion is, see ``motion_at``, shape (N, 3, 3 + n).
+        off: Departures from the mean of these, and of rates, shape (2, 3 + n).
     """
 
     z: FloatArray
@@ -383,6 +363,7 @@ class WatchRoom(NamedTuple):
     vertices: FloatArray
     discs: FloatArray
     nominal: FloatArray
+    off: FloatArray
 
 
 def watch_room(plant: LoopPlant) -> WatchRoom:
@@ -391,5 +372,5 @@ def watch_room(plant: LoopPlant) -> WatchRoom:
     return WatchRoom(
         np.empty(n), np.full(n, np.nan), np.full(4, np.nan), np.full(2 * plant.bases.size - 1, np.nan),
         np.zeros(2), np.full((len(shapes.pieces), 2), np.nan), np.full((len(shapes.pairs), 2), np.nan),
-        *shapes.room(), np.empty((plant.bases.size - 1, 3, n)),
+        *shapes.room(), np.empty((plant.bases.size - 1, 3, n)), np.empty((2, n)),
     )  # fmt: skip

@@ -20,10 +20,8 @@ from coop_drake.laws import words
 from coop_drake.laws.actuators import lag_behind, limit_efforts
 from coop_drake.laws.departures import act_on_wrenches
 from coop_drake.laws.measurements import carry_reports, uniform_pair
-from coop_drake.laws.nominal import carry_axes
 from coop_drake.laws.robot_dynamics import read_robot
 from coop_drake.laws.team_dynamics import stick
-from coop_drake.systems.kernels import step_nominal
 from coop_drake.tree.arrays import FloatArray
 
 
@@ -95,22 +93,10 @@ def update(
                 memory.said[sample % ring, k, i] = before if silent else memory.words[k, k, i]
         return
 
-    # The nominal motions and the cell planner, which all read what was before, as in Drake.
+    # The cell planner, which reads what was before, as in Drake.
     entered = memory.current[sample % memory.current.shape[0]]
     following = memory.current[(sample + 1) % memory.current.shape[0]]
     cell = int(entered[0])
-    if nominal.flow.size:
-        ring, rows = memory.nominal.shape[0], cells.first
-        edges = cells.governed[rows[0, cell] : rows[0, cell + 1]]
-        flat = cells.flats[rows[2, cell] : rows[2, cell + 1]]
-        field = cells.fields[rows[3, cell] : rows[3, cell + 1]]
-        now, later = memory.nominal[sample % ring], memory.nominal[(sample + 1) % ring]
-        speed = nominal.position[0]
-        step_nominal(cells.rows[cell], edges, flat, field, nominal.flow, period, speed, 1.0, now, later)
-    if nominal.axis_gains.size:
-        ring = memory.axes.shape[0]
-        now_axes, later_axes = memory.axes[sample % ring], memory.axes[(sample + 1) % ring]
-        carry_axes(now_axes, room.law, period, nominal.axis_gains[2], later_axes)
     following[0], following[1] = entered[0], entered[1]
     if cell + 1 < cells.rows.shape[0] and left_by_all(cell, channels):
         following[0], following[1] = cell + 1, sample * period

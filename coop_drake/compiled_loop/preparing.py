@@ -34,7 +34,6 @@ from coop_drake.scenario import Scenario
 from coop_drake.simulation.clearance import TeamClearance
 from coop_drake.simulation.run import PATIENCE_ALLOWANCE, patience
 from coop_drake.systems import axis_laws
-from coop_drake.systems.kernels import NOTHING
 from coop_drake.tree.arrays import FloatArray, IntArray
 from coop_drake.tree.component_tree import ComponentTree, axis_levers
 
@@ -186,7 +185,7 @@ def _robots(team: TeamPlant, knowledge: Sequence[RobotKnowledge]) -> LoopTeam:
         knowledge: What every robot knows before the run.
     """
     chains = [robot_chain(known.robot) for known in knowledge]
-    bases, motion = [base_chain(team, robot) for robot in team.robots], knowledge[0].motion
+    bases = [base_chain(team, robot) for robot in team.robots]
     counts = [
         [len(chain) for chain in chains],
         [len(base.chain) for base in bases],
@@ -199,7 +198,6 @@ def _robots(team: TeamPlant, knowledge: Sequence[RobotKnowledge]) -> LoopTeam:
         base_chains=np.vstack([base.chain for base in bases]),
         yaws=np.array([base.yaw for base in bases]),
         loads=np.array([known.load for known in knowledge]),
-        tracking=NOTHING if motion is None else motion.tracking_row(knowledge[0].cells[0]),
     )
 
 
@@ -223,33 +221,18 @@ def _plant(scenario: Scenario, team: TeamPlant, tree: ComponentTree, models: Loo
 
 
 def _nominal(plan: Plan, team: TeamPlant, knowledge: Sequence[RobotKnowledge]) -> LoopNominal:
-    """Return the nominal motions; their flow and the age of reports follow from the control rate of a run."""
-    none, tube, motion = np.empty(0), plan.tube, knowledge[0].axis_motion
-    stated = [one.tolerance for one in plan.transitions if one.tolerance is not None]
-    distances = [
-        [getattr(one, name) for one in stated] for name in ("distance", "departure", "rate_departure")
-    ]
-    mountings = np.concatenate([base_chain(team, robot).mounting for robot in team.robots])
+    """Return the nominal motion; its schedule follows from the control rate of a run."""
+    motion, away = plan.motion, plan.departures
     monitored = [known.monitored for known in knowledge if known.monitored is not None]
-    times = monitored[0].alarm_times if monitored else np.empty((len(plan.cells), 1))
-    of_axes = [np.empty((*times.shape, 3, 0)), *(one.axis_alarms for one in monitored)]
-    gains = none
-    if motion is not None:
-        gains = np.array([motion.tracking.stiffness, motion.tracking.damping, motion.lag])
-    plain = plan.motion
     return LoopNominal(
         NO_SCHEDULE,
-        np.empty((0, 0)) if plain is None else np.ascontiguousarray(plain.points),
-        0.0 if plain is None else plain.period,
-        np.zeros(4) if plain is None else np.ravel(plain.gains),
+        np.empty((0, 0)) if motion is None else np.ascontiguousarray(motion.points),
+        0.0 if motion is None else motion.period,
+        np.zeros(4) if motion is None else np.ravel(motion.gains),
         0.0,
-        np.empty((0, 0)),
-        none if tube is None else np.array([tube.speed, 0.0, tube.radius, tube.rate]),
-        gains,
-        mountings,
-        monitored[0].levels if monitored else none,
+        np.concatenate([base_chain(team, robot).mounting for robot in team.robots]),
+        monitored[0].levels if monitored else np.empty(0),
         monitored[0].unseen if monitored else 0.0,
-        np.ascontiguousarray(np.concatenate(of_axes, axis=3)),
-        times,
-        np.array(distances) if motion is not None else np.empty((0, 0, 0)),
+        np.concatenate([np.empty((3, 0)), *(one.axis_alarms for one in monitored)], axis=1),
+        np.empty((0, 0)) if away is None else np.array([away.position, away.rate]),
     )

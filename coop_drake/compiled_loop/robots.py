@@ -6,6 +6,8 @@ numbers to hand over.
 
 from __future__ import annotations
 
+from math import pi
+
 import numpy as np
 
 from coop_drake.compiled_loop.arrays import (
@@ -22,9 +24,8 @@ from coop_drake.compiled_loop.arrays import (
 from coop_drake.jit import compiled
 from coop_drake.laws import words
 from coop_drake.laws.axis_table import track_axes, write_jumps
-from coop_drake.laws.measurements import NOTHING, TURN, carry_measurements, uniform_pair, write_errors
+from coop_drake.laws.measurements import NOTHING, carry_measurements, uniform_pair, write_errors
 from coop_drake.laws.motion import motion_at, place_on_axes, pull
-from coop_drake.laws.nominal import carry_axes, pull_axes, track_nominal
 from coop_drake.laws.readiness import (
     BRAKES,
     FAR,
@@ -39,23 +40,20 @@ from coop_drake.systems.kernels import (
     axes_ready,
     cell_margin,
     govern,
-    nominal_ready,
-    robot_arrived,
-    show_nominal,
 )
 from coop_drake.tree.arrays import FloatArray, IntArray
 
 LOST_POSE, POSE_NOISE = 1, 5
 """Uses of seeds: losses and noise of measured poses; those of measured states are the next ones."""
 
+ON_TIME = np.array([0.0, 1.0, 0.0])
+"""A clock that never stood still: lag [s], pace [-] and the derivative of the pace [1/s]."""
+
 EARLY = 1e-6
 """Share of a period by which an interval that begins at a sample may seem to begin later [-], by rounding."""
 
 ALARM, SAID = 0, 4
 """Where the alarm stands of a robot's monitor, and what of it the state machine of words is told."""
-
-ON_TIME = np.array([0.0, 1.0, 0.0])
-"""A clock that never stood still: lag [s], pace [-] and the derivative of the pace [1/s]."""
 
 
 @compiled(inlined=True, borrows=True)
@@ -93,7 +91,9 @@ def talk(
             continue
         clock, alarm = now + departures.hearing[0, node], int(memory.alarms[node, SAID])
         phases = memory.phases[sample % memory.phases.shape[0], node]
-        phases[0], phases[1], _ = words.robot_step(schedule, clock, alarm, node, memory.motions[node], known)
+        motion = memory.motions[node]
+        phases[0], phases[1], _ = words.robot_step(schedule, clock, alarm, node, motion, known)
+        phases[2], phases[3], _ = words.phase_at(schedule, motion, now)  # Stamps are of one time.
         moves, phase = moves or phases[1] > 0.0, min(phase, phases[0])
         cell = min(cell, begun(schedule.begins, phases[0]))
     if not moves and memory.supervised[3] > 0.0 and phase < schedule.ends[-1]:
@@ -134,11 +134,8 @@ def compute(
     """
     first, period, lossy = team.first, departures.times[0], departures.probabilities
     taken, seen_at = sample % memory.poses.shape[0], max(sample - departures.periods[0], 0)
-    led, led_then = memory.nominal[sample % memory.nominal.shape[0]], memory.nominal[0]
-    if nominal.flow.size:
-        led_then = memory.nominal[seen_at % memory.nominal.shape[0]]
-    axes_led, last_cell = nominal.axis_gains.size > 0, cells.rows.shape[0] - 1
     passes, points, span = nominal.points.size > 0, nominal.points, nominal.span
+    last_cell = cells.rows.shape[0] - 1
     decided = sample - 1 if whole else sample  # The last sample at which a team that passes has decided.
     for k in range(team.yaws.size):
         # Its axes are the rows from ``begin`` to ``end``, its z_k stands at ``own``.
@@ -156,7 +153,8 @@ def compute(
         for i in range(size // 2, size // 2 + 3):
             robot[i] *= departures.odometry[k]
         seed, shift, sizes = departures.seeds[k, POSE_NOISE], departures.shifts[k], departures.errors
-        _err(sample, 3 * k, shift, memory.exact, seed, number, sizes[:3], room.errors, pose)
+        of_pose = 0.0 if passes else shift  # The pose has stamps of one time where the team passes.
+        _err(sample, 3 * k, of_pose, memory.exact, seed, number, sizes[:3], room.errors, pose)
         seed, sizes = departures.seeds[k, POSE_NOISE + 1], sizes[3 + 2 * own : 3 + 2 * own + size]
         of_states = 3 * team.yaws.size + 2 * own
         _err(sample, of_states, shift, memory.exact, seed, number, sizes, room.errors, robot)
@@ -178,107 +176,79 @@ def compute(
             schedule, motion, clock = nominal.schedule, memory.motions[k], now + departures.hearing[0, k]
             cell = begun(schedule.begins, memory.phases[decided % memory.phases.shape[0], k, 0])
             stamp = memory.phases[(decided - int(departures.periods[0])) % memory.phases.shape[0], k]
-            motion_at(points, span, stamp[0], stamp[1], 0.0, room.then)
+            motion_at(points, span, stamp[2], stamp[3], 0.0, room.then)
             phase, pace, rate = words.phase_at(schedule, motion, clock + nominal.ahead)
             motion_at(points, span, phase, pace, rate, room.ahead)
             phase, _, _ = words.phase_at(schedule, motion, clock)
-        if nominal.levels.size:
-            _monitor(k, sample, decided, now, team, nominal, departures, memory, room, robot)
+        if nominal.levels.size:  # What the monitor says, by raw measurements and their time stamp.
+            led, axes, alarms = room.led, room.led_axes[:, begin:end], memory.alarms[k]
+            for i in range(4):
+                led[i] = room.then[i // 2, i % 2]
+            _take_axes(room.then, room.columns[3 + first[2, k] : 3 + first[2, k + 1]], axes)
+            share, which = largest_departure(
+                load, nominal.mountings[begin:end], room.motion[len(chain) - 1], robot, seen, led, axes,
+                nominal.levels, nominal.axis_alarms[:, begin:end], nominal.unseen,
+            )  # fmt: skip
+            alarms[ALARM], alarms[1], alarms[2] = alarm_at(share, now, alarms[3]), share, which
+            if share > 1.0:
+                alarms[3] = now
 
-        # The desired acceleration of the object's origin, and p_G'.
-        edges = cells.governed[cells.first[0, cell] : cells.first[0, cell + 1]]
+        # The desired accelerations of the object's origin and of the axes, and p_G': by the motion of a team
+        # that passes, else by the governor and by the law of the axes.
+        edges, acts = cells.governed[cells.first[0, cell] : cells.first[0, cell + 1]], 0
         governed, governor = room.governed, memory.governors[k]
-        wanted = room.wanted[: size // 2]
-        linear = wanted[:2] if passes else governed[2:]
+        table, law, jumps = cells.tables[cell, begin:end], room.law[begin:end], room.fading[begin:end]
         if passes:
-            governed[0], governed[1], departing = 0.0, 0.0, room.shown
+            acts, columns = 1, room.columns[3 + first[2, k] : 3 + first[2, k + 1]]
+            wanted, governed[0], governed[1] = room.wanted[: size // 2], 0.0, 0.0
+            linear, asked, axes = wanted[:2], wanted[2:], room.led_axes[:, begin:end]
+            pull(room.ahead, room.then, columns, nominal.gains, seen, robot, wanted)
+            for i in range(6):
+                room.seen[1, i] = seen[i]
+            for i in range(size):
+                room.robots[1, i] = robot[i]
+            _take_axes(room.ahead, columns, axes)
+            room.seen[1, 2], room.seen[1, 5] = axes[0, 0], axes[1, 0]
+            place_on_axes(axes, nominal.mountings[begin:end], room.robots[1, :size])
             if whole:  # Delta E of the departure from the motion.
                 for i in range(6):
-                    departing[i] = seen[i] - (room.then[1, i - 3] if i in (3, 4) else 0.0)
-                told[ENERGY], _ = cell_margin(edges, nominal.gains[0], departing, room.then[0])
-        elif nominal.flow.size:
-            governed[0], governed[1], governor = 0.0, 0.0, led[4:6]
-            track_nominal(team.tracking, seen, governor, led, led_then, linear)
+                    room.departing[i] = seen[i] - (room.then[1, i - 3] if i in (3, 4) else 0.0)
+                told[ENERGY], _ = cell_margin(edges, nominal.gains[0], room.departing, room.then[0])
         else:
+            linear, asked = governed[2:], law
             flat = cells.flats[cells.first[2, cell] : cells.first[2, cell + 1]]
             field = cells.fields[cells.first[3, cell] : cells.first[3, cell + 1]]
             told[ENERGY] = govern(cells.rows[cell], edges, flat, field, time, seen, governor, governed)
-
-        # Desired accelerations of the axes, and the effort for all of them.
-        table, law, jumps = cells.tables[cell, begin:end], room.law[begin:end], room.fading[begin:end]
-        for i in range(begin, end):
-            room.fading[i] = memory.jumps[i] if memory.jumped[k] == cell else 0.0
-        acts = 0
-        if passes:
-            acts, columns = 2, room.columns[3 + first[2, k] : 3 + first[2, k + 1]]
-            pull(room.ahead, room.then, columns, nominal.gains, seen, robot, wanted)
-            for i in range(6):
-                room.seen[2, i] = seen[i]
-            for i in range(size):
-                room.robots[2, i] = robot[i]
-            axes = room.led_axes[:, begin:end]
-            _take_axes(room.ahead, columns, axes)
-            room.seen[2, 2], room.seen[2, 5] = axes[0, 0], axes[1, 0]
-            place_on_axes(axes, nominal.mountings[begin:end], room.robots[2, :size])
-        elif axes_led:  # The law acts on the nominal axes of now; efforts will act on later ones.
-            acts, gains, mounting = 2, nominal.axis_gains, nominal.mountings[begin:end]
-            axes = memory.axes[sample % memory.axes.shape[0], :, begin:end]
-            then = memory.axes[seen_at % memory.axes.shape[0], :2, begin:end]
-            led_robot, later = room.robots[1, :size], room.later[:, begin:end]
-            for row in range(1, 3):
-                for i in range(6):
-                    room.seen[row, i] = seen[i]
-                for i in range(size):
-                    room.robots[row, i] = robot[i]
-            room.seen[1, 2], room.seen[1, 5] = axes[0, 0], axes[1, 0]
-            place_on_axes(axes, mounting, led_robot)
-            track_axes(table, time, ON_TIME, jumps, room.seen[1], led_robot, law)
-            pull_axes(law, seen, robot, then, (gains[0], gains[1]), room.pulled[begin:end])
-            carry_axes(axes, law, 0.5 * period + gains[2], gains[2], later)
-            room.seen[2, 2], room.seen[2, 5] = later[0, 0], later[1, 0]
-            place_on_axes(later, mounting, room.robots[2, :size])
-        else:
+            for i in range(begin, end):
+                room.fading[i] = memory.jumps[i] if memory.jumped[k] == cell else 0.0
             track_axes(table, time, ON_TIME, jumps, seen, robot, law)
-        asked = law
-        if acts > 0:
-            asked = wanted[2:] if passes else room.pulled[begin:end]
+
+        # What the end effector does, and the effort for all of it.
         told[ACCELERATION], told[ACCELERATION + 1], told[ACCELERATION + 2] = linear[0], linear[1], asked[0]
         end_effector_command(load, room.seen[acts], linear, asked, told[COMMAND:])
         effort = memory.efforts[0, own : own + size // 2]
         robot_effort(chain, room.motion, room.robots[acts, :size], told[COMMAND:], asked, effort)
 
-        # The report, by the states on which the law acts.
-        judged, judged_robot, margin = room.seen[acts // 2], room.robots[acts // 2, :size], FAR
+        # The report.
+        margin = FAR
         if cell == last_cell:
             rows, places = memory.recent.shape[0], cells.places[own : own + size // 2]
             tolerances, errors = cells.rooms[:, k + begin : k + end + 1]
             recent = memory.recent[:, own : own + size // 2]
             margin = arrival_margin(places, tolerances, errors, recent, (sample - 1) % rows)
-            shown = led[: 4 if nominal.flow.size else 0]
-            if not passes:
-                margin = robot_arrived(
-                    table, cells.goal, cells.tolerance, axes_led, judged, judged_robot, shown, margin
-                )
-            elif phase < schedule.ends[-1]:
+            if passes and phase < schedule.ends[-1]:
                 margin = min(margin, phase - schedule.ends[-1])
             for i in range(size // 2):
                 recent[sample % rows, i] = pose[i] if i < 3 else robot[i]
         elif passes:
             margin = phase - schedule.begins[cell + 1]
         else:
-            margin = axes_ready(table, cells.tables[cell + 1, begin:end], False, time, judged, judged_robot)
+            margin = axes_ready(table, cells.tables[cell + 1, begin:end], False, time, seen, robot)
             if whole or not margin < 0.0:
                 stiffness = cells.numbers[cell + 1, 1]
                 following = cells.governed[cells.first[0, cell + 1] : cells.first[0, cell + 2]]
-                if nominal.flow.size:
-                    speed, periods = nominal.position[0], nominal.position[1]
-                    target, own_stiffness = cells.numbers[cell, 3:], cells.numbers[cell, 1]
-                    show_nominal(edges, own_stiffness, target, period, periods, speed, led, room.shown)
-                    at_position = nominal_ready(following, stiffness, room.shown, governor)
-                else:
-                    energy, _ = cell_margin(following, stiffness, judged, governor)
-                    at_position = clearance_margin(energy, stiffness, cells.numbers[cell, 0])
-                margin = min(at_position, margin)
+                energy, _ = cell_margin(following, stiffness, seen, governor)
+                margin = min(clearance_margin(energy, stiffness, cells.numbers[cell, 0]), margin)
         alarm, said = memory.alarms[k, ALARM], words.QUIET
         if alarm != QUIET:
             margin, said = min(margin, FAR), words.BRAKES if alarm == BRAKES else words.ASKS
@@ -288,7 +258,7 @@ def compute(
         memory.reports[0, k, 0], memory.reports[0, k, 1] = cell, margin
         if margin >= 0.0 and cell < last_cell and not passes:  # The next cell may begin now.
             after, own_jumps = cells.tables[cell + 1, begin:end], memory.jumps[begin:end]
-            write_jumps(table, after, time, ON_TIME, judged, judged_robot, own_jumps)
+            write_jumps(table, after, time, ON_TIME, seen, robot, own_jumps)
             memory.jumped[k] = cell + 1
         memory.governors[k, 0] += period * governed[0]
         memory.governors[k, 1] += period * governed[1]
@@ -330,10 +300,10 @@ def _err(
             if sample == 0:
                 before[first + i] = values[i]
         for i in range(values.size):
-            moved = values[i] - before[first + i]
-            if i == 2:  # an angle, which may jump by a turn
-                moved -= TURN * np.rint(moved / TURN)
-            values[i] -= shift * moved
+            change = values[i] - before[first + i]
+            if i == 2 and values.size > 3:  # A yaw is known modulo a turn.
+                change -= 2.0 * pi * round(change / (2.0 * pi))
+            values[i] -= shift * change
     largest = 0.0
     for i in range(values.size):
         largest = max(largest, sizes[i, 0], sizes[i, 1])
@@ -397,49 +367,3 @@ def heard_cell(
         return 0, now
     entered = current[heard % current.shape[0]]
     return int(entered[0]), now - (entered[1] - hearing[0, k])
-
-
-@compiled(inlined=True, borrows=True)
-def _monitor(
-    k: int, sample: int, decided: int, now: float, team: LoopTeam, nominal: LoopNominal,
-    departures: LoopDepartures, memory: LoopMemory, room: RobotRoom, robot: FloatArray,
-) -> None:  # fmt: skip
-    """Write what the monitor of robot k says, by what it has measured.
-
-    Args:
-        k: The robot.
-        sample: Number of the sample, or of the next one between two samples.
-        decided: Number of the last sample at which a team that passes has decided.
-        now: Time of the run [s].
-        team: The robots' models.
-        nominal: The nominal motions.
-        departures: What departs.
-        memory: What changes.
-        room: Holds the object's state as the robot measures it, and the motion of its chain then.
-        robot: Its own, shape (2 (3 + n_k),).
-    """
-    begin, size = k + team.first[2, k], 1 + team.first[2, k + 1] - team.first[2, k]
-    age, own = int(departures.periods[0]), size if nominal.axis_alarms.shape[3] else 0
-    made = max(sample - age, 0)
-    axes = memory.axes[made % memory.axes.shape[0], :2, begin : begin + own]
-    then = made * departures.times[0] if age else now
-    cell, time = heard_cell(k, made, then, departures.hearing, memory.current)
-    led, alarms = memory.nominal[made % memory.nominal.shape[0]], memory.alarms[k]
-    if nominal.points.size:
-        begins, led, axes = nominal.schedule.begins, room.led, room.led_axes[:, begin : begin + own]
-        time = memory.phases[(decided - age) % memory.phases.shape[0], k, 0]
-        cell = begun(begins, time)
-        time -= begins[cell]
-        led[0], led[1], led[2], led[3] = room.then[0, 0], room.then[0, 1], room.then[1, 0], room.then[1, 1]
-        if own > 0:
-            _take_axes(room.then, room.columns[3 + team.first[2, k] : 3 + team.first[2, k + 1]], axes)
-    levels = nominal.axis_alarms[cell, :, :, begin : begin + own]
-    hand = room.motion[team.first[0, k + 1] - team.first[0, k] - 1]
-    mounting = nominal.mountings[begin : begin + size]
-    share, which = largest_departure(
-        team.loads[k], mounting, hand, robot, room.seen[0], led, axes, nominal.levels,
-        nominal.alarm_times[cell], levels, time, nominal.unseen,
-    )  # fmt: skip
-    alarms[0], alarms[1], alarms[2] = alarm_at(share, now, alarms[3]), share, which
-    if share > 1.0:
-        alarms[3] = now

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
-from functools import lru_cache
 from math import inf, nan, sqrt
 
 import numpy as np
@@ -19,11 +18,10 @@ from coop_drake.diagram.deployment import (
     measurement_waves,
     seed_of,
 )
-from coop_drake.diagram.robot_controller import report_periods, team_schedule
+from coop_drake.diagram.robot_controller import team_schedule
 from coop_drake.errors import ScenarioError
 from coop_drake.laws.axis_table import first_jumps
 from coop_drake.laws.measurements import NOTHING, channel_rows, whole_periods
-from coop_drake.laws.nominal import nominal_flow
 from coop_drake.laws.readiness import departing_name, mean_samples
 from coop_drake.laws.robot_dynamics import INERTIA, MASS
 from coop_drake.laws.words import WORD_SIZE, first_motion, first_words
@@ -57,12 +55,6 @@ def check_deployment(transport: CompiledTransport, deployment: Deployment) -> fl
         if own.sample_offset:
             allowed = "0: all robots of the compiled loop compute at the same instants"
             raise ScenarioError(where, f"{key}.sample_offset", own.sample_offset, allowed)
-        for field in ("switch_delay", "clock_error"):
-            if getattr(own, field) and transport.plan.motion is None and transport.plan.tube is not None:
-                allowed = (
-                    "0 for a plan with a budget: the compiled loop has one nominal motion for all robots"
-                )
-                raise ScenarioError(where, f"{key}.{field}", getattr(own, field), allowed)
     return deployment.period
 
 
@@ -82,7 +74,9 @@ def departures_of(transport: CompiledTransport, deployment: Deployment) -> array
         for port in sizes
     ]
     lateness = [*(own.switch_delay for own in robots), 0.0]
-    hearing = [[*(own.clock_error for own in robots), 0.0]]
+    shifts = [clock_shift(deployment, k) for k in range(len(names))]
+    ahead = shifts if transport.plan.motion is not None else [0.0] * len(names)
+    hearing = [[*(own.clock_error + shift for own, shift in zip(robots, ahead, strict=True)), 0.0]]
     hearing.append([whole_periods(late, period) for late in lateness])
     hearing.append([whole_periods(messages.delay + late, period) for late in lateness])
     hold = transport.scenario.control.hold
@@ -99,7 +93,7 @@ def departures_of(transport: CompiledTransport, deployment: Deployment) -> array
         errors=np.concatenate(errors),
         biases=np.array([[own.pose_bias.x, own.pose_bias.y, own.pose_bias.theta] for own in robots]),
         odometry=np.array([1.0 + own.odometry_scale for own in robots]),
-        shifts=np.array([clock_shift(deployment, k) / period for k in range(len(names))]),
+        shifts=np.array(shifts) / period,
         limits=np.concatenate([effort_limits(deployment, n) for n in joints]),
         hearing=np.array(hearing, dtype=float),
         silences=_silences(deployment, names),
@@ -148,23 +142,12 @@ def nominal_of(transport: CompiledTransport, deployment: Deployment) -> arrays.L
         ScenarioError: Words of a team that passes travel for longer than its plan has time for.
     """
     period, nominal = check_deployment(transport, deployment), transport.nominal
-    budget, gains = transport.plan.budget, transport.plan.transitions[0].gains
+    budget = transport.plan.budget
     schedule = team_schedule(replace(transport.scenario, deployment=deployment), transport.plan)
     if schedule is not None:
         lag = deployment.actuators.lag if budget is None else budget.lag
         return nominal._replace(schedule=schedule, ahead=0.5 * period + lag)
-    if not nominal.position.size or budget is None:
-        return nominal
-    speed, _, radius, rate = nominal.position
-    periods = report_periods(budget.report_age, period)
-    flow = _flow(gains.stiffness, gains.damping, period).copy()
-    return nominal._replace(flow=flow, position=np.array([speed, periods, radius, rate]))
-
-
-@lru_cache(maxsize=32)
-def _flow(stiffness: float, damping: float, period: float) -> FloatArray:
-    """Return ``nominal_flow``; the threads of BLAS that it wakes would cost as much as half a run."""
-    return nominal_flow(stiffness, damping, period)
+    return nominal
 
 
 def memory_of(transport: CompiledTransport, departures: arrays.LoopDepartures) -> arrays.LoopMemory:
@@ -174,7 +157,7 @@ def memory_of(transport: CompiledTransport, departures: arrays.LoopDepartures) -
     ring, rows = int(departures.periods[0]) + 2, int(departures.periods[1])
     start, widest = transport.plan.start, int(2 * (3 + np.diff(transport.team.first[2]).max()))
     channels = channel_rows(int(departures.periods[2]))
-    nothing, passing = np.zeros(M), robots if transport.plan.motion is not None else 0
+    passing = robots if transport.plan.motion is not None else 0
     nodes, oldest = passing + (passing > 0), int(departures.hearing[2].max()) + 2
     return arrays.LoopMemory(
         state=transport.start.copy(),
@@ -184,8 +167,6 @@ def memory_of(transport: CompiledTransport, departures: arrays.LoopDepartures) -
         exact=np.zeros((2, 3 * robots + states)),
         lines=np.zeros((robots, 2, rows, 1 + widest)),
         governors=np.tile(start[:2], (robots, 1)),
-        nominal=np.tile([*start[:2], 0.0, 0.0, *start[:2]], (ring, 1)),
-        axes=np.tile([transport.first_axes, nothing, nothing], (ring, 1, 1)),
         jumps=first_jumps(transport.cells.tables[0], transport.first_axes),
         jumped=np.zeros(robots),
         recent=np.full((2 * mean_samples(float(departures.times[0])), efforts), inf),
@@ -196,7 +177,7 @@ def memory_of(transport: CompiledTransport, departures: arrays.LoopDepartures) -
         words=np.tile(first_words(NO_SCHEDULE, robots), (nodes, 1, 1)),
         said=np.full((oldest, nodes, WORD_SIZE), NOTHING),
         motions=np.tile(first_motion(), (passing, 1)),
-        phases=np.zeros((ring, passing, 2)),
+        phases=np.zeros((ring, passing, 4)),
         supervised=np.zeros(4),
     )
 

@@ -141,8 +141,6 @@ def watch(
             figures[FUNNEL], figures[FUNNEL_AXIS], figures[FUNNEL_CELL] = margin, i, cell
         if not margin > 0.0:
             end(figures, OUT_OF_FUNNEL, margin, i)
-        if nominal.distances.size:
-            used = max(used, nominal.distances[0, cell, i] / margin if margin > 0.0 else inf)
         lower, upper = cells.slices[0, cell, i], cells.slices[1, cell, i]
         margin = min(z[2 + i] - lower, upper - z[2 + i])
         if not margin > 0.0:
@@ -204,17 +202,8 @@ def watch(
                 apart = hypot(place[0, 0] - room.nominal[j, 0, 0], place[0, 1] - room.nominal[j, 0, 1])
                 figures[SPREAD] = max(figures[SPREAD], apart)
         figures[HOLDS] = memory.supervised[2]
-    elif nominal.flow.size:
-        led = memory.nominal[sample % memory.nominal.shape[0]]
-        vx, vy = memory.state[team.places[1, 0]], memory.state[team.places[1, 1]]
-        used = max(used, hypot(z[0] - led[0], z[1] - led[1]) / nominal.position[2])
-        used = max(used, hypot(vx - led[2], vy - led[3]) / nominal.position[3])
-        if nominal.distances.size:
-            axes = memory.axes[sample % memory.axes.shape[0]]
-            for i in range(z.size - 2):
-                row, rate = plant.axis_rows[0, i], memory.state[team.places[1, 2 + i]]
-                used = max(used, abs(z[2 + i] - axes[0, row]) / nominal.distances[1, cell, i])
-                used = max(used, abs(rate - axes[1, row]) / nominal.distances[2, cell, i])
+        if nominal.stated.size:
+            used = max(used, _share_used(team, nominal, memory, room))
     if used >= 0.0 and not figures[SHARE] > used:
         figures[SHARE] = used
 
@@ -268,6 +257,24 @@ def watch(
         end(figures, STALLED, time)
     elif now >= departures.times[1]:
         end(figures, LATE, time)
+
+
+@compiled(inlined=True, borrows=True)
+def _share_used(team: LoopTeam, nominal: LoopNominal, memory: LoopMemory, room: WatchRoom) -> float:
+    """Return the largest departure from the mean of the robots' motions over what the plan states [-]."""
+    z, robots = room.z, team.yaws.size
+    for i in range(z.size):
+        place = rate = 0.0
+        for k in range(robots):
+            place += room.nominal[k, 0, i] / robots
+            rate += room.nominal[k, 1, i] / robots
+        room.off[0, i], room.off[1, i] = z[i] - place, memory.state[team.places[1, i]] - rate
+    used = 0.0
+    for row in range(2):
+        used = max(used, hypot(room.off[row, 0], room.off[row, 1]) / nominal.stated[row, 0])
+        for i in range(2, z.size):
+            used = max(used, abs(room.off[row, i]) / nominal.stated[row, i - 1])
+    return used
 
 
 @compiled(borrows=True)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from math import inf
-from typing import Any, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
 from pydrake.systems import primitives
@@ -77,7 +77,7 @@ def radio_of(deployment: Deployment, names: Sequence[str], row: int) -> systems.
         late=late[row],
         loss=messages.loss,
         seeds=[seed_of(deployment, row, WORD_USE + sender) for sender in range(1 + robots)],
-        clock_error=own[row].clock_error,
+        clock_error=own[row].clock_error + (clock_shift(deployment, row) if row < robots else 0.0),
         offset=own[row].sample_offset,
         deaf=_interval(own[row].deaf),
         mute=_interval(own[row].silence),
@@ -125,8 +125,10 @@ number; efforts in newtons would ask for a thousandth of a newton, and for very 
 class Wrapping:
     """Adds to a builder the blocks that a deployment asks for round one robot's controller."""
 
-    def __init__(self, builder: DiagramBuilder, deployment: Deployment, robot: int, name: str) -> None:
-        self._builder, self._deployment, self._robot = builder, deployment, robot
+    def __init__(
+        self, builder: DiagramBuilder, deployment: Deployment, robot: int, name: str, *, passes: bool
+    ) -> None:
+        self._builder, self._deployment, self._robot, self._passes = builder, deployment, robot, passes
         self._own = deployment.of_robot(name)
         self.delays: list[Holding] = []
         self.heard: list[Holding] = []
@@ -160,7 +162,8 @@ class Wrapping:
         period, shift = self._deployment.period, clock_shift(self._deployment, self._robot)
         blocks: list[tuple[str, LeafSystem | None]]
         blocks = [(f"{name}_biased", _distortion(self._own, name, size))]
-        if period is not None and shift:
+        # The pose has stamps of one time for all robots of a team that passes.
+        if period is not None and shift and not (self._passes and name == "object_pose"):
             shifted = systems.ShiftedMeasurement(size, shift / period, period, self._own.sample_offset)
             blocks.append((f"{name}_shifted", shifted))
             self.delays.append(shifted)
@@ -407,9 +410,6 @@ class DeployedController:
         time = root.get_time()
         self.diagram.SetDefaultContext(root)
         root.SetTime(time)
-        axes = np.array([object_pose[2], *joints])
-        self._rest(root, "nominal_axes", axes)
-        self._rest(root, "departure_monitor", object_pose[:2], axes, cell)
         self.keep_position(root, object_pose[:2])
         self.command_axes(root, cell, np.zeros(1 + len(joints)))
 
@@ -426,33 +426,11 @@ class DeployedController:
         state = block.GetMyMutableContextFromRoot(root).get_mutable_discrete_state_vector()
         state.SetFromVector([cell, *jumps])
 
-    def nominal_axes(self, root: Context) -> FloatArray | None:
-        """Return nominal angle and joints, then their rates, shape (2, 1 + n); None where there are none."""
-        if not self.controller.HasSubsystemNamed("nominal_axes"):
-            return None
-        block = self.controller.GetSubsystemByName("nominal_axes")
-        return block.states_of(block.GetMyContextFromRoot(root))[:2].copy()
-
-    def nominal_position(self, root: Context) -> FloatArray | None:
-        """Return the object's nominal position, shape (2,) [m]; None where there is none."""
-        if not self.controller.HasSubsystemNamed("nominal_governor"):
-            return None
-        context = self.controller.GetSubsystemByName("nominal_governor").GetMyContextFromRoot(root)
-        return np.array(context.get_discrete_state_vector().value()[:2])
-
     def keep_position(self, root: Context, position: FloatArray) -> None:
-        """Set p_G, and where it has one its nominal motion, to rest at a position, shape (2,) [m]."""
+        """Set p_G to rest at a position, shape (2,) [m]."""
         if self.controller.HasSubsystemNamed("governor_state"):
             governor = self.controller.GetSubsystemByName("governor_state")
             governor.set_integral_value(governor.GetMyMutableContextFromRoot(root), position)
-        self._rest(root, "nominal_governor", position)
-
-    def _rest(self, root: Context, name: str, *values: Any) -> None:
-        """Set the state of a block, where there is one of this name, to its state at rest."""
-        if self.controller.HasSubsystemNamed(name):
-            block = self.controller.GetSubsystemByName(name)
-            state = block.GetMyMutableContextFromRoot(root).get_mutable_discrete_state_vector()
-            state.SetFromVector(block.state_at_rest(*values))
 
 
 def _prepare(delays: tuple[Holding, ...], root: Context) -> None:
@@ -497,10 +475,13 @@ _MEASURED = ("object_pose", "robot_state")
 """What a controller measures."""
 
 
-def build_body(deployment: Deployment, robot: int, name: str, joints: int) -> Body:
-    """Build the sensors and actuators of a robot with a number of joints; arguments as for :func:`deploy`."""
+def build_body(deployment: Deployment, robot: int, name: str, joints: int, *, passes: bool) -> Body:
+    """Build the sensors and actuators of a robot with a number of joints; see :func:`deploy`.
+
+    ``passes`` says whether its team passes from cell to cell.
+    """
     builder, sizes = DiagramBuilder(), {"object_pose": 3, "robot_state": 2 * (3 + joints)}
-    wrapping = Wrapping(builder, deployment, robot, name)
+    wrapping = Wrapping(builder, deployment, robot, name, passes=passes)
     for entry in _MEASURED:
         elements = {f"measured_{entry}": [(0, i) for i in range(sizes[entry])]}
         given = builder.AddNamedSystem(
@@ -535,7 +516,7 @@ def deploy(
     """
     builder = DiagramBuilder()
     builder.AddNamedSystem("controller", controller)
-    wrapping = Wrapping(builder, deployment, robot, name)
+    wrapping = Wrapping(builder, deployment, robot, name, passes=controller.HasOutputPort("phase"))
     for entry in _MEASURED:
         if bodiless:
             builder.ExportInput(controller.GetInputPort(entry), entry)

@@ -18,12 +18,13 @@ from coop_drake.geometry.polygons import BoundaryDistance
 from coop_drake.harmonic_maps import HarmonicMap, VelocityField
 from coop_drake.laws.governor import FIELD_SPEED, slowdown_radius
 from coop_drake.laws.measurements import observer_gains, whole_periods
-from coop_drake.laws.readiness import ArrivalGoal, unseen_time
+from coop_drake.laws.readiness import ArrivalGoal
 from coop_drake.laws.words import CLOCK_ERROR, WORD_PERIOD, Schedule, schedule_of
 from coop_drake.plant import ObjectInertia, RobotPlant, TeamPlant, base_chain, build_robot_plant, robot_chain
 from coop_drake.plant.team import RobotModel
+from coop_drake.robustness.tracking import unknown_time
 from coop_drake.scenario import Hold, Scenario
-from coop_drake.systems import AxisMotion, GovernedCell, MonitoredRobot, NominalMotion
+from coop_drake.systems import GovernedCell, MonitoredRobot
 from coop_drake.tree.arrays import FloatArray
 from coop_drake.tree.component_tree import PlanarPose
 
@@ -53,10 +54,7 @@ class RobotKnowledge:
         hold: When the team is held, None for never.
         observer_gains: Gain and leak of its disturbance observer [1/s]; None for no observer.
         goal: What it compares the means of what it measures with, where it is sampled.
-        motion: The nominal motion of the position; None where p_G follows the measured position.
-        axis_motion: That of the object's angle and of its joints; None where their law acts on what is
-            measured.
-        monitored: What its monitor of departures needs; None where there is no nominal motion.
+        monitored: What its monitor of departures needs; None without a budget.
         measured_age: Age of its measurements, in whole periods [s].
         schedule: Of the words of a team that passes from cell to cell; None for one that rests in them.
         radio: How it hears and speaks these.
@@ -78,8 +76,6 @@ class RobotKnowledge:
     predicted_periods: int = 0
     observer_gains: tuple[float, float] | None = None
     hold: Hold | None = None
-    motion: systems.NominalMotion | None = None
-    axis_motion: systems.AxisMotion | None = None
     monitored: systems.MonitoredRobot | None = None
     measured_age: float = 0.0
     schedule: Schedule | None = None
@@ -151,10 +147,8 @@ def robot_knowledge(
             hold=hold,
             goal=arrival_goal(scenario, plan, robot.q_slice),
             observer_gains=observer_gains(scenario.command_age) if control.observer else None,
-            motion=_motion(scenario, plan, robot.name, 0 if control.predictor else delay),
             measured_age=deployment.whole_delay,
-            axis_motion=_axis_motion(scenario, plan, team, robot, 0 if control.predictor else delay),
-            monitored=_monitored(scenario, plan, team, robot, delay),
+            monitored=_monitored(scenario, plan, team, robot),
             schedule=schedule,
             radio=None if schedule is None else radio_of(deployment, names, robot.index),
             mounting=base_chain(team, robot).mounting,
@@ -173,12 +167,12 @@ def team_schedule(scenario: Scenario, plan: Plan) -> Schedule | None:
     motion, deployment = plan.motion, scenario.deployment
     if motion is None:
         return None
-    period = deployment.period or WORD_PERIOD
-    delay = 0.5 * motion.waiting - 2.0 * CLOCK_ERROR - 2.0 * period
+    period, eps = deployment.period or WORD_PERIOD, CLOCK_ERROR
+    if plan.budget is not None:
+        eps = plan.budget.clock_error
+    delay = 0.5 * motion.waiting - 2.0 * eps - 2.0 * period
     if delay < 0.0:
-        allowed = (
-            f"at least {4.0 / (motion.waiting - 4.0 * CLOCK_ERROR):.6g} Hz, for words of the plan's motion"
-        )
+        allowed = f"at least {4.0 / (motion.waiting - 4.0 * eps):.6g} Hz, for words of the plan's motion"
         raise ScenarioError(str(scenario.path), "deployment.control_rate", deployment.control_rate, allowed)
     if deployment.messages.delay > delay:
         allowed = f"at most {delay:.6g} s: the plan's motion waits no longer for words"
@@ -188,7 +182,7 @@ def team_schedule(scenario: Scenario, plan: Plan) -> Schedule | None:
     begins, ends = motion.windows[:, 0], motion.windows[:, 1]
     return schedule_of(
         begins, begins, begins[:-1] + motion.waiting, ends, ramp=motion.ramp, start_rate=motion.start_rate,
-        period=period, delay=delay, clock_error=CLOCK_ERROR,
+        period=period, delay=delay, clock_error=eps,
     )  # fmt: skip
 
 
@@ -216,7 +210,7 @@ def governed_cells(plan: Plan, maps: Sequence[HarmonicMap]) -> list[GovernedCell
 
 def rest_tolerance(scenario: Scenario, plan: Plan) -> float:
     """Return how close to the goal the position that robots go by counts as arrived [m]."""
-    return float(scenario.goal.tolerances.position - (plan.tube.rest if plan.tube else 0.0))
+    return float(scenario.goal.tolerances.position)
 
 
 def hold_of(scenario: Scenario, plan: Plan) -> Hold | None:
@@ -226,7 +220,7 @@ def hold_of(scenario: Scenario, plan: Plan) -> Hold | None:
     """
     if plan.motion is not None:
         return None
-    return scenario.control.hold or (None if plan.alarms is None else Hold())
+    return scenario.control.hold
 
 
 def arrival_goal(scenario: Scenario, plan: Plan, joints: slice) -> ArrivalGoal:
@@ -274,87 +268,28 @@ def _robot(scenario: Scenario, index: int, factor: float) -> RobotPlant:
     return robot
 
 
-def _motion(scenario: Scenario, plan: Plan, robot: str, age: int) -> NominalMotion | None:
-    """Return the nominal motion of a plan with a position tube, None for other plans."""
-    if plan.tube is None or plan.budget is None:
+def _monitored(scenario: Scenario, plan: Plan, team: TeamPlant, robot: RobotModel) -> MonitoredRobot | None:
+    """Return what a robot's monitor of departures needs, None where the plan has no budget."""
+    deployment, away, budget = scenario.deployment, plan.departures, plan.budget
+    if away is None or budget is None:
         return None
-    deployment, budget = scenario.deployment, plan.budget
     if deployment.period is None:
         raise ScenarioError(
             str(scenario.path), "deployment.control_rate", None,
             f"a number, {budget.control_rate:g} Hz: the plan's budget holds for a sampled team",
         )  # fmt: skip
-    return NominalMotion(
-        tube=plan.tube,
-        start=plan.start[:2],
-        targets=np.array([transition.target for transition in plan.transitions]),
-        period=deployment.period,
-        report_periods=report_periods(budget.report_age, deployment.period),
-        measurement_periods=age,
-        offset=deployment.of_robot(robot).sample_offset,
-    )
-
-
-def _axis_motion(
-    scenario: Scenario, plan: Plan, team: TeamPlant, robot: RobotModel, age: int
-) -> AxisMotion | None:
-    """Return the nominal motion of a robot's axes, None where the plan's budget has none."""
-    deployment, tracking = scenario.deployment, plan.axis_tracking
-    if plan.budget is None or tracking is None or deployment.period is None:
-        return None
-    joints = range(1 + robot.q_slice.start, 1 + robot.q_slice.stop)
-    return AxisMotion(
-        tracking=tracking,
-        start=plan.start[2:][[0, *joints]],
-        period=deployment.period,
-        lag=plan.budget.lag,
-        measurement_periods=age,
-        mounting=base_chain(team, robot).mounting,
-        offset=deployment.of_robot(robot.name).sample_offset,
-    )
-
-
-def _monitored(
-    scenario: Scenario, plan: Plan, team: TeamPlant, robot: RobotModel, age: int
-) -> MonitoredRobot | None:
-    """Return what a robot's monitor of departures needs, None where the plan has no budget."""
-    deployment, alarms, budget = scenario.deployment, plan.alarms, plan.budget
-    if alarms is None or budget is None or deployment.period is None:
-        return None
-    own = [0, *range(1 + robot.q_slice.start, 1 + robot.q_slice.stop)]
-    times, axis_alarms = axis_levels(plan)
+    own = [1, *range(2 + robot.q_slice.start, 2 + robot.q_slice.stop)]
+    levels = away.alarm[0], away.rate_alarm[0], budget.grasp_noise, budget.turn_noise, away.ahead_alarm[0]
     return MonitoredRobot(
         chain=robot_chain(_robot(scenario, robot.index, 1.0)),
         p_LE=np.array([robot.X_LE.x, robot.X_LE.y]),
         mounting=base_chain(team, robot).mounting,
-        levels=np.array(
-            [
-                inf if one is None else one
-                for one in (alarms.position, alarms.velocity, alarms.grasp, alarms.turn, alarms.ahead)
-            ]
-        ),
-        unseen=unseen_time(budget.delay, budget.report_age, budget.period, budget.age_error),
-        axis_alarms=axis_alarms[..., own] if axis_alarms.size else axis_alarms,
-        alarm_times=times,
-        start=plan.start[[0, 1, *(2 + i for i in own)]],
+        levels=np.array([inf if level is None else level for level in levels]),
+        unseen=unknown_time(budget),
+        axis_alarms=np.array([away.alarm[own], away.rate_alarm[own], away.ahead_alarm[own]]),
         period=deployment.period,
-        measurement_periods=age,
         offset=deployment.of_robot(robot.name).sample_offset,
     )
-
-
-def axis_levels(plan: Plan) -> tuple[FloatArray, FloatArray]:
-    """Return when the stages of all cells begin, and the levels of all axes in them: ``MonitoredRobot``."""
-    stated = [one.tolerance for one in plan.transitions if one.tolerance is not None]
-    stages = max((one.alarm_times.size for one in stated), default=1)
-    axes = plan.start.size - 2 if stated else 0
-    times, levels = np.full((len(plan.cells), stages), inf), np.empty((len(plan.cells), stages, 3, axes))
-    for k, one in enumerate(stated):
-        times[k, : one.alarm_times.size] = one.alarm_times
-        for i in range(stages):
-            row = min(i, len(one.alarm) - 1)
-            levels[k, i] = one.alarm[row], one.rate_alarm, one.ahead_alarm[row]
-    return times, levels
 
 
 def _field(harmonic_map: HarmonicMap, governor_gain: float) -> VelocityField:
@@ -363,8 +298,6 @@ def _field(harmonic_map: HarmonicMap, governor_gain: float) -> VelocityField:
 
 
 def _check(plan: Plan, maps: Sequence[HarmonicMap], team: TeamPlant) -> None:
-    if plan.tube is not None and plan.alarms is None:
-        raise PlanError("the plan has a budget, but no alarm levels: plan again")
     if plan.joint_names != team.joint_names:
         raise PlanError(
             f"the plan moves the joints {', '.join(plan.joint_names)}; the scenario's team has "
@@ -415,7 +348,7 @@ def build_robot_controller(knowledge: RobotKnowledge, replacements: Replacements
         for block in blocks.values()
         for port in (block.get_output_port(i) for i in range(block.num_output_ports()))
     }
-    if knowledge.motion is None and knowledge.schedule is None:
+    if knowledge.schedule is None:
         halves = builder.AddNamedSystem("governor_rate", Demultiplexer([2, 2]))
         builder.Connect(outputs["governor_command"], halves.get_input_port())
         start, rate = knowledge.plan.start[:2], halves.get_output_port(0)
@@ -468,7 +401,7 @@ def _blocks(knowledge: RobotKnowledge) -> dict[str, LeafSystem]:
         }
     else:
         led = {
-            **_governor(knowledge, paced=paced),
+            "reference_governor": systems.ReferenceGovernor(knowledge.cells, paced=paced),
             "axis_ppc": systems.AxisPpc(
                 laws,
                 start=plan.start[2:][np.array(axes)],
@@ -479,8 +412,6 @@ def _blocks(knowledge: RobotKnowledge) -> dict[str, LeafSystem]:
             "ready_monitor": systems.ReadyMonitor(
                 *judged,
                 measured=measured,
-                nominal=knowledge.motion is not None,
-                axes_led=knowledge.axis_motion is not None,
             ),
         }
     return {
@@ -499,13 +430,6 @@ def _blocks(knowledge: RobotKnowledge) -> dict[str, LeafSystem]:
     }
 
 
-def _governor(knowledge: RobotKnowledge, *, paced: bool) -> dict[str, LeafSystem]:
-    """Return the block that moves p_G: by the measured position, or by the nominal one."""
-    if knowledge.motion is None:
-        return {"reference_governor": systems.ReferenceGovernor(knowledge.cells, paced=paced)}
-    return {"nominal_governor": systems.NominalGovernor(knowledge.cells, knowledge.motion, paced=paced)}
-
-
 def _additions(knowledge: RobotKnowledge, laws: Sequence[systems.AxisLaw]) -> dict[str, LeafSystem]:
     """Return the blocks that sampling, a budget and a scenario's section ``control`` add."""
     added: dict[str, LeafSystem] = {}
@@ -521,19 +445,17 @@ def _additions(knowledge: RobotKnowledge, laws: Sequence[systems.AxisLaw]) -> di
             knowledge.period,
             offset=knowledge.sample_offset,
         )
-    if knowledge.axis_motion is not None:
-        added["nominal_axes"] = systems.NominalAxes(knowledge.axis_motion)
     if knowledge.hold is not None:
         period, offset = knowledge.period, knowledge.sample_offset
         silence = knowledge.hold.silence
         added["hold_receiver"] = systems.HoldReceiver(silence, period=period, offset=offset)
         added["funnel_clock"] = systems.FunnelClock(period, offset)
-        alarmed = knowledge.monitored is not None
-        added["hold_monitor"] = systems.HoldMonitor(
-            laws, knowledge.hold.energy, alarmed=alarmed, period=period, offset=offset
-        )
+        energy = knowledge.hold.energy
+        added["hold_monitor"] = systems.HoldMonitor(laws, energy, period=period, offset=offset)
     if knowledge.monitored is not None:
-        added["departure_monitor"] = systems.DepartureMonitor(knowledge.monitored)
+        joints = range(3 + knowledge.joints.start, 3 + knowledge.joints.stop)
+        coordinates = knowledge.plan.start.size
+        added["departure_monitor"] = systems.DepartureMonitor(knowledge.monitored, joints, coordinates)
     if knowledge.observer_gains is not None:
         joints = knowledge.joints.stop - knowledge.joints.start
         added["disturbance_observer"] = systems.DisturbanceObserver(joints, *knowledge.observer_gains)
@@ -570,12 +492,6 @@ _REPLACED = {
 }
 """Which signals others get in place of those that a block takes in."""
 
-_NOMINAL = {"object_state": "nominal_object", "robot_state": "nominal_robot"}
-"""Signals that the blocks below get instead, where a plan has a nominal motion of the axes."""
-
-_FOLLOWERS = ("axis_ppc", "ready_monitor")
-"""Blocks that act on this nominal motion."""
-
 _AHEAD = {"object_state": "object_ahead", "robot_state": "robot_ahead"}
 """Which signals the blocks that command get then: measured angles and rates would be late and noisy."""
 
@@ -597,11 +513,6 @@ def _connect_by_name(
             renamed |= _REPLACED["state_predictor"]
         if "object_ahead" in outputs and label in _COMPENSATED:
             renamed |= _AHEAD
-        if "nominal_axes" in blocks and label != "nominal_axes":
-            if label in _FOLLOWERS:
-                renamed |= _NOMINAL
-            else:
-                renamed["axis_acceleration"] = "pulled_axes"
         if "disturbance_observer" in blocks and label in _COMPENSATED:
             renamed |= _REPLACED["disturbance_observer"]
         for port in (block.get_input_port(i) for i in range(block.num_input_ports())):

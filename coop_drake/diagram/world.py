@@ -75,7 +75,7 @@ def control_period(scenario: Scenario) -> float:
 def record_sizes(scenario: Scenario, plan: Plan, joints: Sequence[int]) -> tuple[dict[str, int], ...]:
     """Return names and sizes of what robots with numbers of joints, then their supervisor, report."""
     holds, passes = hold_of(scenario, plan) is not None, plan.motion is not None
-    monitored = plan.alarms is not None
+    monitored = plan.departures is not None
     robots = (robot_record(n, holds=holds, monitored=monitored, passes=passes) for n in joints)
     return (*robots, supervisor_record(len(joints), holds=holds or passes, passes=passes))
 
@@ -112,7 +112,8 @@ def build_world(scenario: Scenario, plan: Plan, exchange: Exchange) -> World:
     link = builder.AddNamedSystem("team_link", TeamLink(joints, period, exchange, size))
     bodies = []
     for k, robot in enumerate(team.robots):
-        body = build_body(scenario.deployment, k, robot.name, joints[k])
+        passes = scenario.planner.hand_over == "pass"
+        body = build_body(scenario.deployment, k, robot.name, joints[k], passes=passes)
         diagram = builder.AddNamedSystem(f"robot_{k}_body", body.diagram)
         for output, receiver in (
             (station.diagram.GetOutputPort("object_pose"), diagram.GetInputPort("object_pose")),

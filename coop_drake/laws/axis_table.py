@@ -22,18 +22,17 @@ from coop_drake.tree.arrays import FloatArray
 #
 # Compiled code reads the table, because handing over one array is much quicker than handing over ten.
 
-LAW_COLUMNS = 19
+LAW_COLUMNS = 17
 """Columns of a table: slice and goal interval [rad or m], lambda [1/s], 1 where the funnel is quintic and 0
 where it is not, kappa [rad^2/s^2 or m^2/s^2], k1, k2 and mu [1/s], the smallest distance to a bound over the
 funnel's width [-], the time T in which the commands of the last cell fade [s], the largest V with which the
-cell may be entered, the time after which it may be left [s], and within what an axis must be to leave it at
-rest: the distance from the middle of the goal interval [rad or m] and the rate [rad/s or m/s]; both are 0
-where V alone decides. The last columns are the limit of the axis's rate, infinity for none [rad/s or m/s],
-g, the rate at which the axis may approach it [1/s], and the limit of its acceleration, infinity for none."""
+cell may be entered, and the time after which it may be left [s]. The last columns are the limit of the axis's
+rate, infinity for none [rad/s or m/s], g, the rate at which the axis may approach it [1/s], and the limit of
+its acceleration, infinity for none."""
 
 SLICE_LOWER, SLICE_UPPER, GOAL_LOWER, GOAL_UPPER, DECAY_RATE, QUINTIC = range(6)
 LOG_GAIN, POSITION_GAIN, RATE_GAIN, RAMP_RATE, SATURATION, FADING_TIME, ENERGY_BOUND = range(6, 13)
-LEAVING_TIME, REST_REACH, REST_RATE, RATE_LIMIT, LIMIT_GAIN, ACCELERATION_LIMIT = range(13, LAW_COLUMNS)
+LEAVING_TIME, RATE_LIMIT, LIMIT_GAIN, ACCELERATION_LIMIT = range(13, LAW_COLUMNS)
 """The columns by name, in this order."""
 
 
@@ -44,7 +43,7 @@ def axis_table(funnel: Funnel, gains: TransitionGains) -> FloatArray:
         funnel: Funnels of m axes.
         gains: Gains, those of each axis of shape (m,).
     """
-    table, rest = np.empty((funnel.goal_lower.size, LAW_COLUMNS)), gains.rest
+    table = np.empty((funnel.goal_lower.size, LAW_COLUMNS))
     for i, row in enumerate(table):
         write_row(
             row,
@@ -54,9 +53,6 @@ def axis_table(funnel: Funnel, gains: TransitionGains) -> FloatArray:
             funnel.shape == "quintic",
             gains.limits_of(i),
         )
-        if rest is not None:
-            row[REST_REACH], row[REST_RATE] = rest.reach[i], rest.rate[i]
-            row[LEAVING_TIME] = max(gains.hand_over_time, rest.after)
     return table
 
 
@@ -84,7 +80,7 @@ def write_row(
     row[POSITION_GAIN], row[RATE_GAIN], row[RAMP_RATE], row[SATURATION], row[FADING_TIME] = gains
     row[QUINTIC] = 1.0 if quintic else 0.0
     row[RATE_LIMIT], row[LIMIT_GAIN], row[ACCELERATION_LIMIT] = limits
-    row[LEAVING_TIME], row[REST_REACH], row[REST_RATE] = row[FADING_TIME], 0.0, 0.0
+    row[LEAVING_TIME] = row[FADING_TIME]
 
 
 @compiled(borrows=True)
@@ -236,21 +232,17 @@ def switch_jump(
 ) -> float:  # fmt: skip
     """Return by how much the acceleration of an axis jumps if the next cell is entered [rad/s^2 or m/s^2].
 
-    It is the law of its cell less that of the next one. An axis that leaves its cell at rest is then in the
-    middle of its goal interval, where the law of its cell asks for none. The number follows from the plan
-    alone: no error of a measurement fades with it, and all robots have the same.
+    It is the law of its cell less that of the next one.
 
     Args:
         row: The axis in its cell, a row of an ``axis_table``.
         next_row: The axis in the next cell.
-        time: With the next four as in ``track_row``; of an axis that leaves at rest they are not read.
+        time: With the next four as in ``track_row``.
         position: x [rad or m].
         rate: x' [rad/s or m/s].
         pace: tau' [-].
         pace_rate: tau'' [1/s].
     """
-    if row[REST_RATE] > 0.0:
-        return -track_row(next_row, 0.0, 0.5 * (row[GOAL_LOWER] + row[GOAL_UPPER]), 0.0)[0]
     now = track_row(row, time, position, rate, pace, pace_rate)[0]
     return now - track_row(next_row, 0.0, position, rate, pace, pace_rate)[0]
 

@@ -54,21 +54,6 @@ AxisGains = Annotated[FloatArray, Codec(tuple[Gain, ...], np.array, np.ndarray.t
 
 
 @dataclass(frozen=True)
-class RestCondition:
-    """When a cell may be left, and where every axis must be then, and how slow; arrays of shape (1 + n,).
-
-    Attributes:
-        after: Time since the cell was entered, at least that of the hand-over [s].
-        reach: Largest distance from the middle of the goal interval [rad or m].
-        rate: Largest magnitude of the rate [rad/s or m/s].
-    """
-
-    after: Annotated[NotNegative, EXACT]
-    reach: AxisGains
-    rate: AxisGains
-
-
-@dataclass(frozen=True)
 class TransitionGains:
     """Gains of one transition; per-axis arrays are ordered (theta, q...).
 
@@ -88,8 +73,6 @@ class TransitionGains:
             [-]; see ``track_axis``.
         hand_over_time: T, in which the commands of the last cell fade; 0 for a step, as printed [s].
         energy_bound: Largest PPC energy V accepted when this transition is entered, shape (1 + n,).
-        rest: When this transition may be left, in place of the next one's energy bound; null where that bound
-            decides.
         speed_limit: Largest speed of the object's origin; null for none [m/s].
         rate_limit: Largest rate of every axis; null for none, shape (1 + n,) [rad/s or m/s].
         limit_gain: g, the rate at which an axis may approach its limit; null without limits [1/s].
@@ -110,7 +93,6 @@ class TransitionGains:
     saturation: Annotated[Saturation, EXACT]
     hand_over_time: Annotated[NotNegative, EXACT]
     energy_bound: AxisGains
-    rest: RestCondition | None = None
     speed_limit: Gain | None = None
     rate_limit: Bounds | None = None
     limit_gain: Gain | None = None
@@ -126,10 +108,6 @@ class TransitionGains:
         first = before.stiffness, before.damping, before.governor_gain
         return np.array([*own, *first, self.hand_over_time, inf if limit is None else limit])
 
-    def with_governor(self, stiffness: float, damping: float, governor_gain: float) -> TransitionGains:
-        """Return the same gains with another K [1/s^2], zeta [1/s] and K_G [-]."""
-        return replace(self, stiffness=stiffness, damping=damping, governor_gain=governor_gain)
-
     def select(self, axes: NDArray[np.intp]) -> TransitionGains:
         """Return the same gains for some axes only, for instance those that one robot controls."""
         return replace(
@@ -137,7 +115,6 @@ class TransitionGains:
             decay_rate=self.decay_rate[axes],
             log_gain=self.log_gain[axes],
             energy_bound=self.energy_bound[axes],
-            rest=self.rest and replace(self.rest, reach=self.rest.reach[axes], rate=self.rest.rate[axes]),
             rate_limit=None if self.rate_limit is None else self.rate_limit[axes],
             acceleration_limit=None if self.acceleration_limit is None else self.acceleration_limit[axes],
         )
@@ -524,7 +501,6 @@ def transition_gains(
     speed_limit: float | None = None,
     rate_limit: FloatArray | None = None,
     acceleration_limit: FloatArray | None = None,
-    rate_share: float = 1.0,
 ) -> TransitionGains:
     """Return the gains with which a transition is executed.
 
@@ -540,7 +516,6 @@ def transition_gains(
         speed_limit: Largest speed of the object's origin, None for none [m/s].
         rate_limit: Largest rate of every axis, infinity for none, shape (m,) [rad/s or m/s]; None for none.
         acceleration_limit: Largest acceleration of every axis in the same way, shape (m,).
-        rate_share: Share of the limits of rates for which decay rates are chosen [-].
 
     Returns:
         Gains of governor and funnels, and for each axis the energy V below which the transition begins.
@@ -554,8 +529,7 @@ def transition_gains(
     if isinstance(gain_set, FixedGains):  # as given, not by way of the root of K
         damping, governor_gain = float(gain_set.damping), float(gain_set.governor_gain)
     narrowest = np.full(len(resting), np.min(goal_upper[1:] - goal_lower[1:], initial=inf))
-    rates = None if rate_limit is None else rate_share * rate_limit
-    limits = (narrowest + inf if most is None else most for most in (rates, acceleration_limit))
+    limits = (narrowest + inf if most is None else most for most in (rate_limit, acceleration_limit))
     ends = slice_lower, slice_upper, goal_lower, goal_upper, resting, narrowest, *limits
     axes = np.transpose(ends).astype(float)
     rows = np.array([scheduled_axis(schedule, i > 0, *axis) for i, axis in enumerate(axes)])

@@ -6,7 +6,7 @@ from math import atan2, cos, hypot, inf, isfinite, sin, sqrt
 from typing import NamedTuple
 
 from coop_drake.jit import compiled
-from coop_drake.laws.axis_table import ENERGY_BOUND, GOAL_LOWER, GOAL_UPPER, REST_RATE, REST_REACH, track_row
+from coop_drake.laws.axis_table import ENERGY_BOUND, GOAL_LOWER, GOAL_UPPER, track_row
 from coop_drake.laws.governor import energy_margin
 from coop_drake.laws.measurements import whole_periods
 from coop_drake.laws.robot_dynamics import PX, PY, rotated
@@ -79,8 +79,7 @@ def position_arrival(distance: float, speed: float, tolerance: float) -> float:
 def axis_ready(row: FloatArray, next_row: FloatArray, position: float, rate: float) -> tuple[float, float]:
     """Return the margins with which one axis may enter the next cell: inside its goal, and V small enough.
 
-    V is that at the beginning of the next funnel, with the next gains. An axis that leaves its cell at rest
-    must instead be near the middle of its goal interval, and slow, as a ``RestCondition`` says.
+    V is that at the beginning of the next funnel, with the next gains.
 
     Args:
         row: The axis in the current cell, a row of an ``axis_table``.
@@ -88,9 +87,6 @@ def axis_ready(row: FloatArray, next_row: FloatArray, position: float, rate: flo
         position: x [rad or m].
         rate: x' [rad/s or m/s].
     """
-    if row[REST_RATE] > 0.0:
-        away = abs(position - 0.5 * (row[GOAL_LOWER] + row[GOAL_UPPER]))
-        return 1.0 - away / row[REST_REACH], 1.0 - abs(rate) / row[REST_RATE]
     energy, bound = track_row(next_row, 0.0, position, rate)[1], next_row[ENERGY_BOUND]
     inside = interval_margin(position, row[GOAL_LOWER], row[GOAL_UPPER])
     return inside, (bound - energy) / max(energy, bound)
@@ -206,31 +202,17 @@ def arrival_margin(
     return margin
 
 
-# How far a robot and its object are measured off their nominal motion, and what counts as an alarm.
+# How far a robot and its object are measured off their motion, and what counts as an alarm.
 #
-# A plan with a budget certifies that nothing departs from its nominal motion by more than D. What a robot
-# measures departs by at most D and the noise of one robot, n_1. The plan therefore states levels a >= D +
-# n_1, above which something is wrong that the budget does not count. While no robot measures more, nothing
-# departs by more than a + n_2, n_2 being the noise that is left where all robots judge: for what they all
-# measure, that of their mean. So it was when the measurements were made. Until a report is used that rests
-# on them, the time
+# A plan with a budget certifies that nothing departs from its motion by more than D. What a robot measures
+# departs by at most D and the noise of one robot. Levels above that are stated in the plan, and the motion
+# keeps so much room in its cells that nothing leaves them while no robot measures more, see
+# ``robustness/tracking.py``. There are levels of |e|, of |e'|, and of |e + t e'|, where rates take the team
+# in the time t until a robot knows of it.
 #
-# t = delay + s + report_age + T
-#
-# passes, s being by how much the age of measurements may be wrong, in which its rate takes a departure e to
-# e + t e'. So there is a level of |e + t e'|, too. All between is on the straight way from the one to the
-# other, and what is driven by at most w beside (for axes also by the model's error in the nominal
-# acceleration) is no farther from it than w t^2 / 2. The plan leaves room for
-# all of it: the strip between the governed sets and their cells is so wide, and so is the distance of a
-# nominal axis to its funnel's bounds, from the sample on for the time t, in the next cell, too, see
-# ``robustness/alarms.py``. The levels of axes change at the times since the entry that the plan states.
-# With a wrong age, n_1 and n_2 hold s times the largest rate, too, for rates s times the largest
-# acceleration.
-#
-# The measurements are raw ones, before predictor, observer and averages, and are compared with the nominal
-# state of the instant at which they were made. The pose of a robot's base is compared with that which the
-# object's pose and the robot's joints give, which shows a grasp that slips and a base that is not where its
-# odometry has it.
+# The measurements are raw ones, before predictor, observer and averages, and are compared with the motion at
+# their time stamp. The pose of a robot's base is compared with that which the object's pose and the robot's
+# joints give, which shows a grasp that slips and a base that is not where its odometry has it.
 
 QUIET_TIME = 0.1
 """A monitor is quiet again when nothing was above its level for so long [s]."""
@@ -242,7 +224,7 @@ QUIET, ASKS, BRAKES = 0.0, 1.0, 2.0
 """What a monitor says: nothing, that the team be held, or that the drives brake."""
 
 POSITION, VELOCITY, GRASP, TURN, AHEAD = range(5)
-"""Levels that all transitions of a plan have in common."""
+"""Levels of the object and the grasp; those of axes follow."""
 
 NAMES = (
     "the object's position",
@@ -252,18 +234,6 @@ NAMES = (
     "where the object goes",
 )
 """What they are levels of."""
-
-
-def unseen_time(delay: float, report_age: float, period: float, age_error: float) -> float:
-    """Return t, how long a departure may grow until a report is used no more that does not know of it [s].
-
-    Args:
-        delay: Age of the measurements [s].
-        report_age: How long a report may be used [s].
-        period: T [s].
-        age_error: By how much older the measurements may be [s].
-    """
-    return (whole_periods(delay, period) + whole_periods(report_age, period) + 1) * period + age_error
 
 
 def departing_name(check: int, joints: tuple[str, ...]) -> str:
@@ -283,8 +253,7 @@ def departing_name(check: int, joints: tuple[str, ...]) -> str:
 @compiled(borrows=True)
 def largest_departure(
     p_LE: FloatArray, mounting: FloatArray, hand: FloatArray, robot: FloatArray, seen: FloatArray,
-    led: FloatArray, axes: FloatArray, levels: FloatArray, stages: FloatArray, stage_levels: FloatArray,
-    time: float, unseen: float,
+    led: FloatArray, axes: FloatArray, levels: FloatArray, axis_levels: FloatArray, unseen: float,
 ) -> tuple[float, int]:  # fmt: skip
     """Return the largest measured departure over its level [-], and the number of this level.
 
@@ -297,19 +266,14 @@ def largest_departure(
         hand: Last row of the chain's motion, which ``estimate_object`` has written.
         robot: (z_k, z_k') as measured, shape (2 (3 + n),).
         seen: What ``estimate_object`` makes of it and of the measured pose, shape (6,).
-        led: p^ and p^' when this was measured, shape (4,) or longer.
-        axes: x^ and x^' then, shape (2, 1 + n) or more rows; shape (2, 0) where they have no nominal motion.
+        led: Position and velocity of the motion when this was measured, shape (4,) or longer.
+        axes: Axes and their rates then, shape (2, 1 + n) or more rows.
         levels: Of position, velocity, grasp, angle of the base, infinite where there is none, and of where
             the position goes, shape (5,).
-        stages: Times since the entry of the cell at which the stages of its levels begin, the first one at 0,
-            infinite behind the last one, shape (stages,) [s].
-        stage_levels: Of the axes, of their rates, and of where both take them, shape (stages, 3, 1 + n).
-        time: Time since the entry when this was measured [s].
+        axis_levels: Of the axes, of their rates, and of where both take them, shape (3, 1 + n).
         unseen: t, how far ahead that is [s].
     """
-    largest, which, n, stage = 0.0, POSITION, mounting.size - 1, 0
-    while stage + 1 < stages.size and stages[stage + 1] <= time:
-        stage += 1
+    largest, which, n = 0.0, POSITION, mounting.size - 1
     rx, ry = rotated(cos(seen[2]), sin(seen[2]), p_LE[0], p_LE[1])
     turn = robot[2] - seen[2] - mounting[0]
     for i in range(n):
@@ -332,8 +296,8 @@ def largest_departure(
         e = (robot[2 + i] if i > 0 else seen[2]) - axes[0, i]
         v = (robot[5 + n + i] if i > 0 else seen[5]) - axes[1, i]
         for row, off in enumerate((e, v, e + unseen * v)):
-            if abs(off) > largest * stage_levels[stage, row, i]:
-                largest, which = abs(off) / stage_levels[stage, row, i], 5 + row * axes.shape[1] + i
+            if abs(off) > largest * axis_levels[row, i]:
+                largest, which = abs(off) / axis_levels[row, i], 5 + row * axes.shape[1] + i
     return largest, which
 
 

@@ -52,7 +52,7 @@ def quickest_plan(
     gain_set: GainSet,
     *,
     gain_set_name: str,
-    least_overlap: float = 0.0,
+    room: FloatArray | None = None,
     progress: Progress | None = None,
 ) -> Plan:
     """Make a plan along the path of a search's result, with other boxes if these can be found.
@@ -67,7 +67,8 @@ def quickest_plan(
         found: The channel that a search found, or a path that boxes cover.
         gain_set: Gains, fixed or to be scheduled.
         gain_set_name: Name under which the scenario knows them.
-        least_overlap: Least overlap of consecutive boxes in every angle and joint [rad or m].
+        room: Distance to the boundaries of cells that a motion keeps, of the position and of all axes, shape
+            (2 + n,) [m, rad]; None for none.
         progress: Called with a phase and the fraction of it that is done.
 
     Raises:
@@ -76,9 +77,9 @@ def quickest_plan(
         StallError: If a passage is too narrow or too slow to be executed; names it.
         TooQuickError: If a limit of acceleration would act; names the joint.
     """
-    unit = usual_unit(problem.tree)
+    unit, room = usual_unit(problem.tree), np.zeros(len(problem.start) - 1) if room is None else room
     if unit == 1.0:
-        return _quickest(problem, found, gain_set, gain_set_name, least_overlap, progress)
+        return _quickest(problem, found, gain_set, gain_set_name, room, progress)
     scale = Rescaling(problem, unit)
     try:
         made = _quickest(
@@ -86,7 +87,7 @@ def quickest_plan(
             scale.usual(found),
             scale.gains(gain_set),
             gain_set_name,
-            least_overlap,
+            scale.room(room),
             progress,
         )
     except TooQuickError:
@@ -105,7 +106,7 @@ def _quickest(
     found: Channel | CoveredPath,
     gain_set: GainSet,
     gain_set_name: str,
-    least_overlap: float,
+    room: FloatArray,
     progress: Progress | None,
 ) -> Plan:
     if isinstance(found, Channel):
@@ -116,7 +117,7 @@ def _quickest(
         progress("choosing boxes", 0.0)
 
     def covered(limits: FloatArray | None = None) -> Plan | None:
-        better = cover_path(problem, path, found.margin, gain_set, least_overlap, limits)
+        better = cover_path(problem, path, found.margin, gain_set, limits, room)
         if better is None:
             return None
         try:
@@ -193,8 +194,8 @@ def cover_path(
     path: FloatArray,
     margin: float,
     gain_set: GainSet,
-    least_overlap: float = 0.0,
     limits: FloatArray | None = None,
+    room: FloatArray | None = None,
 ) -> tuple[Channel, tuple[FloatArray, ...]] | None:
     """Cover a path with boxes such that the transport is fast: few boxes, and narrow ones in narrow passages.
 
@@ -207,9 +208,9 @@ def cover_path(
         path: Free configurations from start to goal, circular axes unwrapped, shape (m, 3 + n) [m, rad].
         margin: The margin that the path keeps [m].
         gain_set: Gains, fixed or to be scheduled.
-        least_overlap: Least overlap of consecutive boxes in every angle and joint [rad or m].
         limits: Largest speed of the object, then largest rates of all axes, shape (2 + n,) [m/s, rad/s or
             m/s]; None for none.
+        room: As ``quickest_plan`` has it.
 
     Returns:
         The boxes, and for each a point in it and in the next one at which it is left, the last one the goal,
@@ -221,13 +222,14 @@ def cover_path(
     angle = float(path[-1, 2] + nearest_turn(float(problem.goal_pose[2] - path[-1, 2])))
     goals = np.array(final_intervals(problem, goal_values(problem, angle, path[-1, 2:])))
     limits = np.full(len(problem.start) - 1, np.inf) if limits is None else limits
+    room = np.zeros(len(problem.start) - 1) if room is None else room
     passing = problem.settings.hand_over == "pass"
     # At a small margin some levels are equal; each is tried once.
     for least_clearance, pads in dict.fromkeys(
-        (max(fraction * margin, LEAST_CLEARANCE), _wide(pads, 0.5 * least_overlap))
-        for fraction, pads in LEVELS
+        (max(fraction * margin, LEAST_CLEARANCE), pads) for fraction, pads in LEVELS
     ):
-        points = _waypoints(boxes, grid, path, least_clearance, pads[0], PASSING_SHARE if passing else 1.0)
+        least, narrowest = least_clearance + float(room[0]), pads[0] + float(room[1:].max())
+        points = _waypoints(boxes, grid, path, least, narrowest, PASSING_SHARE if passing else 1.0)
         if points is None:
             continue
         if passing:
@@ -237,7 +239,7 @@ def cover_path(
         places = np.concatenate([[0.0], np.cumsum(steps)])
         waypoints = Waypoints(
             boxes, grid, points, places, np.array(pads), goals, schedule_of(gain_set), limits,
-            least_clearance, passing,
+            least, passing, room[1:],
         )  # fmt: skip
         rows, margin = choose_boxes(waypoints), CORE_FRACTION * least_clearance
         regions = Regions(problem, swept, margin)
@@ -247,11 +249,6 @@ def cover_path(
             targets = (*(points[j, :2] for j in rows[:-1, 1]), problem.goal_pose[:2])
             return Channel(free, margin, angle), targets
     return None
-
-
-def _wide(pads: tuple[float, ...], least: float) -> tuple[float, ...]:
-    """Return the paddings that are wide enough, in place of narrower ones once and twice the least."""
-    return tuple(sorted({pad for pad in (*pads, least, 2.0 * least) if pad >= max(least, pads[0])}))
 
 
 def _waypoints(
@@ -295,7 +292,7 @@ def _waypoints(
 
 def _box(waypoints: Waypoints, first: int, last: int, pad: int) -> FreeBox:
     """The box of some waypoints with one of the paddings, before its positions are known."""
-    part, width = waypoints.path[first : last + 1], waypoints.pads[pad]
+    part, width = waypoints.path[first : last + 1], waypoints.pads[pad] + waypoints.room
     lower = np.maximum(waypoints.boxes.lower, part[:, 2:].min(axis=0) - width)
     upper = np.minimum(waypoints.boxes.upper, part[:, 2:].max(axis=0) + width)
     return FreeBox(Polygon(), Polygon(), lower, upper, part[:, :2].copy())
@@ -318,6 +315,8 @@ class Waypoints(NamedTuple):
         limits: Largest speed of the object, then largest rates of all axes, shape (1 + m,) [m/s, rad/s].
         least_clearance: Clearance that every waypoint must keep [m].
         passing: Whether the team passes from cell to cell without a stop.
+        room: By how much boxes are wider than their paddings at either end of every axis, which a motion does
+            not use, shape (m,) [rad or m].
     """
 
     boxes: BoxArrays
@@ -329,7 +328,8 @@ class Waypoints(NamedTuple):
     schedule: Schedule
     limits: FloatArray
     least_clearance: float
-    passing: bool = False
+    passing: bool
+    room: FloatArray
 
 
 @compiled
@@ -372,8 +372,9 @@ def choose_boxes(waypoints: Waypoints) -> IntArray:
                 if not begun + travel[i, p] < time[j, :nexts].max():
                     continue
                 for a in range(m):
-                    lower[a] = max(waypoints.boxes.lower[a], least[i, a] - waypoints.pads[p])
-                    upper[a] = min(waypoints.boxes.upper[a], most[i, a] + waypoints.pads[p])
+                    width = waypoints.pads[p] + waypoints.room[a]
+                    lower[a] = max(waypoints.boxes.lower[a], least[i, a] - width)
+                    upper[a] = min(waypoints.boxes.upper[a], most[i, a] + width)
                 clearances = clearances_in_box(
                     waypoints.boxes, waypoints.grid, lower, upper, waypoints.path, i, j, largest
                 )

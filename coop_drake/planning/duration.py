@@ -300,7 +300,7 @@ def estimated(plan: Plan) -> tuple[Plan, FloatArray, FloatArray]:
     crossings = [
         (
             np.ascontiguousarray(edges_of(plan.governed(index))),
-            _governor_row(plan, index),
+            plan.governor_row(index),
             axis_table(plan.funnel(index), transition.gains),
         )
         for index, transition in enumerate(plan.transitions)
@@ -327,14 +327,6 @@ def estimated(plan: Plan) -> tuple[Plan, FloatArray, FloatArray]:
             jumps[:] = 0.0
         transitions.append(replace(transition, estimated_time=seconds))
     return replace(plan, transitions=tuple(transitions)), speeds, accelerations
-
-
-def _governor_row(plan: Plan, index: int) -> FloatArray:
-    """Return the governor's row; the largest speed of p_G counts as one of the object."""
-    row = plan.governor_row(index)
-    if plan.tube is not None:
-        row[SPEED_LIMIT] = min(row[SPEED_LIMIT], plan.tube.speed)
-    return row
 
 
 def _at_rest(position: FloatArray, axes: FloatArray) -> FloatArray:

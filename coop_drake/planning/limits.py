@@ -41,20 +41,18 @@ OBJECT_FACTORS = (1.0, 0.5, 0.7, 1.5, 2.0)
 a larger share is quicker, and a smaller one where the angles do."""
 
 
-def speed_shares(problem: PlanningProblem, plan: Plan, spare_rate: float = 0.0) -> Iterator[FloatArray]:
+def speed_shares(problem: PlanningProblem, plan: Plan) -> Iterator[FloatArray]:
     """Yield limits of the object's speed and of all axes that keep the limits of bases and joints.
 
     Args:
         problem: What was asked, with the limits.
         plan: A plan for it without limits of speed.
-        spare_rate: What every axis needs besides [rad/s or m/s].
 
     Yields:
         Limits, infinity where there is none, shape (2 + n,) [m/s, rad/s or m/s]. If the
         first ones do not slow the plan down, no others follow.
     """
     limits, needs = problem.limits, _needs(plan)
-    needs[1:] += spare_rate
     levers = base_levers(problem.tree, limits)
     bounds = KEPT * np.concatenate((limits.base_speeds, limits.turn_rates))
     caps = np.concatenate((np.full(2, np.inf), KEPT * limits.joint_rates))

@@ -35,7 +35,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from itertools import pairwise
 from math import inf, isfinite
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import scipy.linalg
@@ -43,12 +43,13 @@ import shapely
 from numpy.typing import NDArray
 from scipy.interpolate import BSpline
 
-from coop_drake.answers.motion import AGE_PHASE, LARGEST_DAMPING, WAITING, Motion
+from coop_drake.answers.motion import AGE_PHASE, LARGEST_DAMPING, WAITING, Motion, TeamGains
 from coop_drake.answers.plan import Plan
 from coop_drake.answers.problem import PlanningProblem
 from coop_drake.errors import PlanError
 from coop_drake.geometry.polygons import edges_of
 from coop_drake.jit import compiled
+from coop_drake.laws.governor import Value
 from coop_drake.planning.motion_barrier import (
     BEZIER,
     BRAKES,
@@ -63,7 +64,6 @@ from coop_drake.planning.motion_barrier import (
 from coop_drake.planning.motion_limits import (
     Chains,
     largest_shares,
-    motion_limits,
     team_chains,
     times_at_limits,
 )
@@ -137,62 +137,7 @@ ACCEPTED = 0.01
 """Share of the decrease that the slope promises with which a step is accepted [-]."""
 
 
-# The initial path: along the plan's paths, every span in a cell.
-
-
-def first_points(plan: Plan, chains: Chains, limits: FloatArray, overlap: float) -> FloatArray:
-    """Return control points along the paths of a plan's transitions, three at rest at either end, (m, 3 + n).
-
-    Angles and joints move evenly from the middle of one goal interval to that of the next. Spans are shorter
-    where two cells overlap for a short way only, and where there is little clearance.
-
-    Args:
-        plan: The plan.
-        chains: The bases.
-        limits: Largest velocities and accelerations, see ``motion_limits``.
-        overlap: Fewest spans of an overlap of two cells [-].
-    """
-    ways, clearances, overlaps, resting = [], [], [], plan.start[2:]
-    for index, transition in enumerate(plan.transitions):
-        goal = 0.5 * (transition.goal_lower + transition.goal_upper)
-        if index + 1 == len(plan.transitions):
-            wanted = (plan.goal_pose[2], *plan.goal_joints)
-            kept = np.clip(resting, transition.goal_lower, transition.goal_upper)
-            goal = np.array([k if w is None else w for k, w in zip(kept, wanted, strict=True)])
-        line, shares = shapely.LineString(transition.path), np.linspace(0.0, 1.0, SAMPLES)
-        places = shapely.get_coordinates(shapely.line_interpolate_point(line, shares, normalized=True))
-        ways.append(np.hstack([places, resting + shares[:, None] * (goal - resting)]))
-        region = plan.governed(index)
-        clearances.append(shapely.distance(shapely.boundary(region), shapely.points(places)))
-        resting = goal
-    for index, (before, after) in enumerate(pairwise(ways)):
-        overlaps.append((_inside(plan, index + 1, before), _inside(plan, index, after)))
-    way, clearance = np.concatenate(ways), np.concatenate(clearances)
-    steps, spans = np.diff(way, axis=0), times_at_limits(chains, limits, way) / SPAN_TIME
-    room = np.maximum(np.minimum(clearance[1:], clearance[:-1]), 1e-4)
-    spans = np.maximum(spans, CLEARANCE_SPANS * np.hypot(*steps[:, :2].T) / room)
-    for index, (reached, left) in enumerate(overlaps):
-        middle = (index + 1) * SAMPLES
-        begin = middle - 1 - int(np.argmin(np.append(reached[::-1], False)))
-        end = middle + int(np.argmin(np.append(left, False)))
-        piece = slice(max(begin, 0), min(end, len(spans)))
-        have = spans[piece].sum()
-        if have > 0.0:
-            spans[piece] *= max(1.0, overlap / have)
-        else:
-            spans[piece] = overlap / max(piece.stop - piece.start, 1)
-    at = np.append(0.0, np.cumsum(spans))
-    places = np.linspace(0.0, at[-1], max(int(np.ceil(at[-1])) + 1, 5))
-    inner = np.stack([np.interp(places, at, column) for column in way.T], axis=1)
-    return np.concatenate([inner[:1], inner[:1], inner, inner[-1:], inner[-1:]])
-
-
-def _inside(plan: Plan, index: int, way: FloatArray) -> NDArray[np.bool_]:
-    """Return which samples of a way are in a cell, shape (samples,)."""
-    cell, axes = plan.cells[index], way[:, 2:]
-    boxed: NDArray[np.bool_] = np.all((axes > cell.lower) & (axes < cell.upper), axis=1)
-    boxed[boxed] = shapely.contains_xy(plan.governed(index), *way[boxed, :2].T)
-    return boxed
+# The cells as a motion sees them.
 
 
 class CellSets(NamedTuple):
@@ -213,15 +158,79 @@ class CellSets(NamedTuple):
     ends: IntArray
 
 
-def cell_sets(plan: Plan) -> CellSets:
-    """Return the cells of a plan as a motion sees them."""
+def cell_sets(plan: Plan, room: FloatArray | float) -> CellSets:
+    """Return the cells of a plan as a motion sees them; room is kept from the ends of axes' intervals."""
     lower, upper = (np.array([getattr(cell, end) for cell in plan.cells]) for end in ("lower", "upper"))
-    kept = np.minimum(MARGIN, MARGIN_SHARE * (upper - lower))
+    kept = room + np.minimum(MARGIN, MARGIN_SHARE * (upper - lower))
+    if not (lower + kept < upper - kept).all():
+        cell, axis = np.argwhere(lower + kept >= upper - kept)[0]
+        raise PlanError(f"cell {cell} leaves no room on axis {axis}")
     regions = [plan.governed(index) for index in range(len(plan.cells))]
     shapely.prepare(regions)
     rings = [edges_of(region) for region in regions]
     ends = np.cumsum([0, *(len(ring) for ring in rings)])
     return CellSets(lower + kept, upper - kept, regions, np.concatenate(rings), ends)
+
+
+# The initial path: along the plan's paths, every span in a cell.
+
+
+def first_points(
+    plan: Plan, cells: CellSets, chains: Chains, limits: FloatArray, overlap: float
+) -> FloatArray:
+    """Return control points along the paths of a plan's transitions, three at rest at either end, (m, 3 + n).
+
+    Angles and joints move evenly from the middle of one goal interval to that of the next. Spans are shorter
+    where two cells overlap for a short way only, and where there is little clearance.
+
+    Args:
+        plan: The plan.
+        cells: Its cells, as the motion sees them.
+        chains: The bases.
+        limits: Largest velocities and accelerations, see ``motion_limits``.
+        overlap: Fewest spans of an overlap of two cells [-].
+    """
+    ways, clearances, overlaps, resting = [], [], [], plan.start[2:]
+    for index, transition in enumerate(plan.transitions):
+        goal = 0.5 * (transition.goal_lower + transition.goal_upper)
+        if index + 1 == len(plan.transitions):
+            wanted = (plan.goal_pose[2], *plan.goal_joints)
+            kept = np.clip(resting, transition.goal_lower, transition.goal_upper)
+            goal = np.array([k if w is None else w for k, w in zip(kept, wanted, strict=True)])
+        line, shares = shapely.LineString(transition.path), np.linspace(0.0, 1.0, SAMPLES)
+        places = shapely.get_coordinates(shapely.line_interpolate_point(line, shares, normalized=True))
+        ways.append(np.hstack([places, resting + shares[:, None] * (goal - resting)]))
+        region = plan.governed(index)
+        clearances.append(shapely.distance(shapely.boundary(region), shapely.points(places)))
+        resting = goal
+    for index, (before, after) in enumerate(pairwise(ways)):
+        overlaps.append((_inside(cells, index + 1, before), _inside(cells, index, after)))
+    way, clearance = np.concatenate(ways), np.concatenate(clearances)
+    steps, spans = np.diff(way, axis=0), times_at_limits(chains, limits, way) / SPAN_TIME
+    room = np.maximum(np.minimum(clearance[1:], clearance[:-1]), 1e-4)
+    spans = np.maximum(spans, CLEARANCE_SPANS * np.hypot(*steps[:, :2].T) / room)
+    for index, (reached, left) in enumerate(overlaps):
+        middle = (index + 1) * SAMPLES
+        begin = middle - 1 - int(np.argmin(np.append(reached[::-1], False)))
+        end = middle + int(np.argmin(np.append(left, False)))
+        piece = slice(max(begin, 0), min(end, len(spans)))
+        have = spans[piece].sum()
+        if have > 0.0:
+            spans[piece] *= max(1.0, overlap / have)
+        else:
+            spans[piece] = overlap / max(piece.stop - piece.start, 1)
+    at = np.append(0.0, np.cumsum(spans))
+    places = np.linspace(0.0, at[-1], max(int(np.ceil(at[-1])) + 1, 5))
+    inner = np.stack([np.interp(places, at, column) for column in way.T], axis=1)
+    return np.concatenate([inner[:1], inner[:1], inner, inner[-1:], inner[-1:]])
+
+
+def _inside(cells: CellSets, index: int, way: FloatArray) -> NDArray[np.bool_]:
+    """Return which samples of a way are in a cell, shape (samples,)."""
+    axes = way[:, 2:]
+    boxed: NDArray[np.bool_] = np.all((axes > cells.lower[index]) & (axes < cells.upper[index]), axis=1)
+    boxed[boxed] = shapely.contains_xy(cells.regions[index], *way[boxed, :2].T)
+    return boxed
 
 
 def bezier_points(parts: int) -> FloatArray:
@@ -325,7 +334,7 @@ def brake(
 
 
 @compiled(inlined=True)
-def _time_shares(s: Any) -> tuple[Any, Any, Any, Any]:
+def _time_shares(s: Value) -> tuple[Value, Value, Value, Value]:
     """Return by which shares of its control points t is found at s from 0 to 1 in a span, taken linear there.
 
     Where spans are equal, it is.
@@ -333,25 +342,47 @@ def _time_shares(s: Any) -> tuple[Any, Any, Any, Any]:
     return (1.0 - s) / 6.0, (4.0 - 3.0 * s) / 6.0, (1.0 + 3.0 * s) / 6.0, s / 6.0
 
 
-def quickest_motion(plan: Plan, problem: PlanningProblem, age: float) -> Motion:
+def pull_gains(age: float) -> TeamGains:
+    """Return K_t and zeta_t of a team without a budget, for position and axes alike.
+
+    Args:
+        age: How old commands are when they act: what is measured, computed, and followed with a lag [s].
+    """
+    damping = min(LARGEST_DAMPING, AGE_PHASE / age) if age > 0.0 else LARGEST_DAMPING
+    gains = 0.25 * damping * damping, damping
+    return gains, gains
+
+
+def quickest_motion(
+    plan: Plan,
+    problem: PlanningProblem,
+    limits: FloatArray,
+    gains: TeamGains,
+    waiting: float = WAITING,
+    room: FloatArray | None = None,
+) -> Motion:
     """Return the quickest motion found.
 
     Args:
         plan: The plan, with its cells.
-        problem: The question that it answers, with the team and its limits.
-        age: How old commands are when they act: what is measured, computed, and followed with a lag [s].
+        problem: The question that it answers, with the team.
+        limits: Largest velocities, accelerations and jerks, see ``motion_limits``.
+        gains: Gains with which the team will be pulled to the motion.
+        waiting: 2 W [s].
+        room: Distance that axes keep from the ends of their intervals, shape (1 + n,) [rad, m]; the regions
+            of a plan with a budget have the room of the position already.
 
     Raises:
         PlanError: No motion was found that stays in the cells; says where.
     """
-    chains, table = team_chains(problem), LIMIT_SHARE * motion_limits(problem.limits)
-    cells = cell_sets(plan)
+    chains, table = team_chains(problem), LIMIT_SHARE * limits
+    cells = cell_sets(plan, 0.0 if room is None else room)
     free = np.where([True, True, False], table, inf)  # Jerk is limited where spans are about equal.
     for finer in range(FINER + 1):
-        points = first_points(plan, chains, table, OVERLAP_SPANS * 2**finer)
+        points = first_points(plan, cells, chains, table, OVERLAP_SPANS * 2**finer)
         points = np.column_stack([points, SPAN_TIME * (np.arange(len(points)) - 1.0)])
         try:
-            last = _Program(cells, chains, free, WAITING, points, EVENNESS, parts=1)
+            last = _Program(cells, chains, free, waiting, points, EVENNESS, parts=1)
             break
         except PlanError:
             if finer == FINER:
@@ -362,7 +393,7 @@ def quickest_motion(plan: Plan, problem: PlanningProblem, age: float) -> Motion:
         for finer in range(FINER + 1):
             equal = uniform_points(before, PERIOD / 2**finer)
             try:
-                last = _Program(cells, chains, table, WAITING, equal, evenness, PARTS)
+                last = _Program(cells, chains, table, waiting, equal, evenness, PARTS)
             except PlanError:
                 if finer == FINER:
                     raise
@@ -372,9 +403,7 @@ def quickest_motion(plan: Plan, problem: PlanningProblem, age: float) -> Motion:
                 break
     period = float(last.points[2, -1] - last.points[1, -1])
     made = last.points[:, :-1].copy(), period, period * last.windows, last.kappa.copy()
-    damping = min(LARGEST_DAMPING, AGE_PHASE / age) if age > 0.0 else LARGEST_DAMPING
-    gains = 0.25 * damping * damping, damping
-    return Motion(*made, WAITING, BRAKE_RAMP, last.start_rate, (gains, gains))
+    return Motion(*made, waiting, BRAKE_RAMP, last.start_rate, gains)
 
 
 def uniform_points(points: FloatArray, period: float) -> FloatArray:

@@ -40,7 +40,7 @@ from coop_drake.progress import Progress
 from coop_drake.tree.component_tree import nearest_turn
 
 if TYPE_CHECKING:
-    from coop_drake.planning.budget.tolerant import BeyondBudget
+    from coop_drake.planning.tolerance import BeyondBudget
 
 FINER_ATTEMPTS = 2
 """Number of further searches after a path that cannot be executed, each with half the margin."""
@@ -72,14 +72,14 @@ def plan(
         problem: What is asked.
         gain_set: Gains, fixed or to be scheduled.
         gain_set_name: Name under which the scenario knows them.
-        budget: Departures from the ideal team that the plan shall tolerate; needs scheduled gains.
+        budget: Departures from the ideal team that the plan shall tolerate; only with ``hand_over: pass``.
         effort: As ``PlannerSettings`` has it, in place of that of the problem.
         progress: Called with a phase and the fraction of it that is done. If it raises PatienceError, a plan
             is finished along the way that is certified by then; without one, the error goes to the caller.
 
     Raises:
-        ValueError: The effort is negative or no number, or the team shall pass from cell to cell under a
-            budget, or with bases that are not known.
+        ValueError: The effort is negative or no number, the team shall rest in every cell under a budget, or
+            pass from cell to cell with bases that are not known.
 
     Returns:
         Found with the plan, BeyondLimits with a plan that limits refuse, Infeasible or Undecided.
@@ -88,8 +88,10 @@ def plan(
         if not 0.0 <= effort < inf:
             raise ValueError(f"effort is {effort}; allowed are numbers of 0 or more")
         problem = replace(problem, settings=replace(problem.settings, effort=effort))
-    if problem.settings.hand_over == "pass" and (budget is not None or not problem.limits.base_components):
-        raise ValueError("hand_over: pass needs limits.base_components and allows no budget")
+    if problem.settings.hand_over == "pass" and not problem.limits.base_components:
+        raise ValueError("hand_over: pass needs limits.base_components")
+    if problem.settings.hand_over == "rest" and budget is not None:
+        raise ValueError("a budget needs hand_over: pass")
     # Floors are remembered by question, and the caller may change the arrays of a question between two calls.
     problem = replace(problem, start=problem.start.copy(), goal_pose=problem.goal_pose.copy())
     local, near = local_question(problem), None
@@ -219,17 +221,8 @@ def _made(
     progress: Progress | None = None,
 ) -> Plan | BeyondBudget:
     if problem.settings.hand_over == "pass":
-        return _passing(problem, found, gain_set, name, progress)
-    if budget is None:
-        return _slow_enough(problem, found, gain_set, name, progress)
-    if not isinstance(gain_set, ScheduledGains):
-        raise ValueError(f"a budget needs scheduled gains; the gain set {name!r} is fixed")
-    from coop_drake.planning.budget.tolerant import tolerant_plan  # Here: it imports scipy.
-
-    made = tolerant_plan(problem, found, gain_set, gain_set_name=name, budget=budget, progress=progress)
-    if isinstance(made, Plan) and (broken := refusals(problem, made)):
-        raise StallError("under the budget, " + "; ".join(refusal.describe() for refusal in broken))
-    return made
+        return _passing(problem, found, gain_set, name, budget, progress)
+    return _slow_enough(problem, found, gain_set, name, progress)
 
 
 def _passing(
@@ -237,24 +230,35 @@ def _passing(
     found: Channel | CoveredPath,
     gain_set: GainSet,
     name: str,
+    budget: Budget | None,
     progress: Progress | None,
-) -> Plan:
+) -> Plan | BeyondBudget:
     """The plan of a team that passes from cell to cell, with its motion: this keeps the limits."""
-    from coop_drake.planning.motion import quickest_motion  # Here: it imports scipy.
+    from coop_drake.planning.motion import pull_gains, quickest_motion  # Here: it imports scipy.
+    from coop_drake.planning.motion_limits import motion_limits
+    from coop_drake.planning.tolerance import tolerant_motion
 
-    made = quickest_plan(problem, found, gain_set, gain_set_name=name, progress=progress)
-    if progress is not None:
-        with suppress(PatienceError):  # The plan is certified: it gets its motion.
-            progress("planning the motion through all cells", 0.0)
-    age = gain_set.age if isinstance(gain_set, ScheduledGains) else 0.0
-    try:
-        motion = quickest_motion(made, problem, age)
-    except (PlanError, np.linalg.LinAlgError) as error:
-        raise StallError(
-            f"no motion through its cells without a stop was found: {error}; "
-            "with planner.hand_over: rest, the plan is returned"
-        ) from error
-    seconds, longest = cell_times(motion), problem.settings.max_transition_time
+    made: Plan | BeyondBudget
+    if budget is not None:
+        made = tolerant_motion(problem, found, gain_set, gain_set_name=name, budget=budget, progress=progress)
+        if not isinstance(made, Plan):
+            return made
+    else:
+        made = quickest_plan(problem, found, gain_set, gain_set_name=name, progress=progress)
+        if progress is not None:
+            with suppress(PatienceError):  # The plan is certified: it gets its motion.
+                progress("planning the motion through all cells", 0.0)
+        age = gain_set.age if isinstance(gain_set, ScheduledGains) else 0.0
+        try:
+            motion = quickest_motion(made, problem, motion_limits(problem.limits), pull_gains(age))
+        except (PlanError, np.linalg.LinAlgError) as error:
+            raise StallError(
+                f"no motion through its cells without a stop was found: {error}; "
+                "with planner.hand_over: rest, the plan is returned"
+            ) from error
+        made = replace(made, motion=motion)
+    assert made.motion is not None  # by both ways
+    seconds, longest = cell_times(made.motion), problem.settings.max_transition_time
     if seconds.max() > longest:
         raise StallError(
             f"cell {seconds.argmax()} is refused by planner.max_transition_time: from its entry to the next "
@@ -262,7 +266,7 @@ def _passing(
         )
     steps = zip(made.transitions, seconds.tolist(), strict=True)
     timed = tuple(replace(step, estimated_time=time) for step, time in steps)
-    return replace(made, transitions=timed, motion=motion)
+    return replace(made, transitions=timed)
 
 
 def _slow_enough(

@@ -86,6 +86,10 @@ class Rescaling:
             return replace(gain_set, smoothing=smoothing)
         return replace(gain_set, smoothing=smoothing, wall_stiffness=gain_set.wall_stiffness / self.unit)
 
+    def room(self, room: FloatArray) -> FloatArray:
+        """Room of the position and of all axes in metres, shape (2 + n,), expressed in the unit."""
+        return room / self._units[1:]
+
     def plan(self, made: Plan) -> Plan:
         """A plan in the unit, expressed in metres, but for its gains and the digest of its problem."""
         unit, axes = self.unit, self._units[2:]

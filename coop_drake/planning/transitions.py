@@ -247,18 +247,16 @@ def keep_limits(problem: PlanningProblem, plan: Plan, gain_set: GainSet) -> Plan
     return plan
 
 
-def share_speeds(problem: PlanningProblem, plan: Plan, gain_set: GainSet, spare_rate: float = 0.0) -> Plan:
+def share_speeds(problem: PlanningProblem, plan: Plan, gain_set: GainSet) -> Plan:
     """Return a plan that keeps the limits of speed, the quickest of a few ways to share them among the axes.
 
     Args:
         problem: What was asked, with limits of speed.
         plan: A plan with the gains of the gain set.
         gain_set: Gains, fixed or to be scheduled.
-        spare_rate: What the rate of every axis may exceed the estimate by, for instance as its budget lets it
-            depart from its nominal motion [rad/s or m/s].
     """
     tried = []
-    for shares in speed_shares(problem, plan, spare_rate):
+    for shares in speed_shares(problem, plan):
         limited = timed(with_gains(plan, gain_set, plan.gain_set, shares))
         tried.append(replace(limited, speeds=stated_speeds(problem, shares)))
     return min(tried, key=plan_time)
@@ -275,9 +273,8 @@ def with_gains(
     name: str,
     limits: FloatArray | None = None,
     accelerations: FloatArray | None = None,
-    rate_share: float = 1.0,
 ) -> Plan:
-    """A plan with the gains of another gain set, without a budget; its estimated times are kept.
+    """A plan with the gains of another gain set; its estimated times are kept.
 
     Args:
         plan: The plan.
@@ -285,7 +282,6 @@ def with_gains(
         name: Name under which the scenario knows them.
         limits: Largest speed of the object and rates of all axes, shape (2 + n,); those of the plan if None.
         accelerations: Largest accelerations of all axes, shape (1 + n,); those of the plan if None.
-        rate_share: Share of the limits of rates for which gains are chosen [-].
     """
     if isinstance(gain_set, ScheduledGains):
         gain_set = gain_set.slowed(plan.age_factor)
@@ -294,11 +290,10 @@ def with_gains(
     for cell, transition in zip(plan.cells, plan.transitions, strict=True):
         goals = (transition.goal_lower, transition.goal_upper)
         most = transition.gains.acceleration_limit if accelerations is None else accelerations
-        gains = _gains(gain_set, cell, transition.neck, goals, resting, limits, most, rate_share)
-        transitions.append(replace(transition, gains=gains, tolerance=None, governed=None))
+        gains = _gains(gain_set, cell, transition.neck, goals, resting, limits, most)
+        transitions.append(replace(transition, gains=gains))
         resting = 0.5 * (transition.goal_lower + transition.goal_upper)
-    made = replace(plan, transitions=tuple(transitions), gain_set=name)
-    return replace(made, budget=None, tube=None, axis_tracking=None)
+    return replace(plan, transitions=tuple(transitions), gain_set=name)
 
 
 @dataclass(frozen=True)
@@ -405,7 +400,6 @@ def _gains(
     resting: FloatArray,
     limits: FloatArray | None = None,
     accelerations: FloatArray | None = None,
-    rate_share: float = 1.0,
 ) -> TransitionGains:
     speed = None if limits is None or not isfinite(limits[0]) else float(limits[0])
     return transition_gains(
@@ -419,7 +413,6 @@ def _gains(
         speed_limit=speed,
         rate_limit=None if limits is None else limits[1:],
         acceleration_limit=accelerations,
-        rate_share=rate_share,
     )
 
 

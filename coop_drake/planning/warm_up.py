@@ -52,9 +52,9 @@ def main() -> None:
         (None,),
         settings=PlannerSettings(margin=0.1),
     )
-    plan(question, ScheduledGains(), gain_set_name="scheduled", budget=BUDGET)
     passing = replace(question, settings=replace(question.settings, hand_over="pass"), limits=LIMITS)
-    plan(passing, ScheduledGains(), gain_set_name="scheduled")
+    for asked, budget in ((question, None), (passing, None), (passing, BUDGET)):
+        plan(asked, ScheduledGains(), gain_set_name="scheduled", budget=budget)
     Proofs(question).run(SLICES)
     bent = Polygon([(0.0, 0.0), (3.0, 0.0), (3.0, 1.0), (1.0, 1.0), (1.0, 3.0), (0.0, 3.0)])
     PassageFinder(bent).find((2.5, 0.5), (0.5, 2.5))

@@ -14,7 +14,6 @@ from coop_drake.answers.budget import LIMITS, Budget
 from coop_drake.answers.document import content_digest, tree_document
 from coop_drake.answers.problem import PlanningProblem
 from coop_drake.errors import ScenarioError
-from coop_drake.laws import ScheduledGains
 from coop_drake.laws.couplings import disagreement_coupling, rate_terms
 from coop_drake.plant.component_tree import base_points, component_bodies, read_component_tree
 from coop_drake.plant.parsing import bodies_of, joints_of, read_once
@@ -266,10 +265,9 @@ def budget_of(choice: str | None, scenario: Scenario, problem: PlanningProblem) 
     required = scenario.deployment.budget
     if choice is None and required == "none":
         return None
-    name = scenario.selected_gains
-    if not isinstance(scenario.gain_sets[name], ScheduledGains):
-        allowed = "a gain set of scheduled gains: the funnels of others never close, so that no budget holds"
-        raise ScenarioError(str(scenario.path), "gains.selected", name, allowed)
+    if scenario.planner.hand_over != "pass":
+        allowed = "pass: budgets hold for teams that pass from cell to cell"
+        raise ScenarioError(str(scenario.path), "planner.hand_over", "rest", allowed)
     choice, masses = choice or required, _of_models(scenario)
     budget = read_budget(choice, scenario, problem.tree, masses)
     if wrong := wrong_facts(budget, _facts(scenario, masses)):

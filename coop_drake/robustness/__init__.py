@@ -1,5 +1,6 @@
-"""Bounds of what departs under a budget, for the planner, which chooses, and the verifier, which checks."""
+"""How far a team may depart from its motion under a budget, and what its masses couple."""
 
-from coop_drake.lazy import lazy_names
+from coop_drake.robustness.couplings import cell_couplings
+from coop_drake.robustness.tracking import departures_of, moving_of
 
-__getattr__, __dir__, __all__ = lazy_names(__name__, __file__)
+__all__ = ["cell_couplings", "departures_of", "moving_of"]

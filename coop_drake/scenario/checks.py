@@ -51,8 +51,9 @@ def _setting_faults(scenario: Scenario) -> Faults:
         known = ", ".join(sorted(scenario.gains.sets))
         yield "gains.selected", scenario.gains.selected, f"a gain set, one of {known}"
     passes = scenario.planner.hand_over == "pass"
-    if passes and scenario.deployment.budget != "none":
-        yield "planner.hand_over", "pass", "rest; pass needs a scenario without deployment.budget"
+    if not passes and scenario.deployment.budget != "none":
+        allowed = "none; with planner.hand_over: pass a plan may have a budget"
+        yield "deployment.budget", scenario.deployment.budget, allowed
     hold = scenario.control.hold
     if hold is not None and passes:
         for key in ("energy", "silence"):

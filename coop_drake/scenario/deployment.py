@@ -47,7 +47,8 @@ PRESETS: dict[str, dict[str, Any]] = {
         "mass_error": 0.2,
         "measurements": {"position_noise": 0.001, "angle_noise": 0.0005, "rate_noise": 0.01, "delay": 0.01},
         "actuators": {"base_force": 650.0, "lag": 0.005},
-        "messages": {"loss": 0.2},
+        "messages": {"loss": 0.2, "delay": 0.025},
+        "clock_error": 0.002,
     }
 }
 """What each preset says, in the units of ``deployment``. Mobile base: a robot that computes on board, and
@@ -370,7 +371,8 @@ class Deployment:
     Attributes:
         preset: The departures of a usual team, which the keys beside it replace one by one. ``mobile_base``:
             200 Hz, measurements 10 ms late with noise of 1 mm, 0.5 mrad and 0.01 /s, masses believed 20 % too
-            large, base forces up to 650 N, actuators that lag by 5 ms, a fifth of the reports lost.
+            large, base forces up to 650 N, actuators that lag by 5 ms, messages 25 ms late of which a fifth
+            is lost, clocks 2 ms off.
         control_rate: How often controllers compute a new effort; null for continuous time, which excludes
             noise, delays, losses, silence, wrong clocks and budgets. Delays are rounded up to whole periods
             [Hz].
@@ -383,7 +385,8 @@ class Deployment:
         joint_friction: Friction of every joint, which no robot knows of.
         pushes: Forces from outside.
         start_offset: How far the team stands off the plan's start.
-        clock_error: Largest error of the time at which robots believe to measure [s].
+        clock_error: Largest error of a robot's clock, drawn for each: robots believe to measure at another
+            time. The pose has stamps of one time in a team that passes [s].
         budget: Under which budget of these departures a plan must hold: ``position`` for the object's
             position alone, ``all`` for angles and joints, too.
         seed: Seed of noise and losses.

@@ -21,7 +21,7 @@ from coop_drake.diagram.robot_controller import arrival_goal
 from coop_drake.geometry.polygons import BoundaryDistance
 from coop_drake.harmonic_maps import HarmonicMap
 from coop_drake.laws import readiness
-from coop_drake.laws.axis_table import REST_RATE, axis_table
+from coop_drake.laws.axis_table import axis_table
 from coop_drake.laws.ppc import governed_gains
 from coop_drake.plant import TeamPlant, read_component_tree
 from coop_drake.plant.facts import scenario_digest
@@ -251,11 +251,8 @@ def _readiness(plan: Plan, sample: Sample) -> dict[str, float]:
     table = axis_table(plan.funnel(following), gains)
     for i, name in enumerate(_axes(plan)):
         inside, slow = readiness.axis_ready(own[i], table[i], sample.z[2 + i], sample.rates[2 + i])
-        if own[i, REST_RATE] > 0.0:
-            margins[f"{name} rests in the middle of its goal interval"] = min(inside, slow)
-        else:
-            margins[f"{name} reaches its goal interval"] = inside
-            margins[f"the energy of {name} falls below the next funnel's bound"] = slow
+        margins[f"{name} reaches its goal interval"] = inside
+        margins[f"the energy of {name} falls below the next funnel's bound"] = slow
     return margins
 
 

@@ -12,7 +12,7 @@ from coop_drake.systems.block import (
     supervisor_record,
 )
 from coop_drake.systems.departures import FloorFriction, Pushes, Sticking, WheelSlips
-from coop_drake.systems.governor import GovernedCell, NominalGovernor, NominalMotion, ReferenceGovernor
+from coop_drake.systems.governor import GovernedCell, ReferenceGovernor
 from coop_drake.systems.holds import FunnelClock, HoldMonitor, HoldReceiver, HoldSupervisor
 from coop_drake.systems.measurements import (
     DisturbanceObserver,
@@ -27,7 +27,7 @@ from coop_drake.systems.measurements import (
 from coop_drake.systems.messages import Exchange, Interruption, MessageChannel, TeamLink
 from coop_drake.systems.monitors import ArrivalMonitor, DepartureMonitor, MonitoredRobot
 from coop_drake.systems.motion import MotionFollower, PassingMonitor
-from coop_drake.systems.ppc import AxisLaw, AxisMotion, AxisPpc, NominalAxes, axis_laws
+from coop_drake.systems.ppc import AxisLaw, AxisPpc, axis_laws
 from coop_drake.systems.readiness import CellPlanner, ReadyMonitor
 from coop_drake.systems.words import Radio, RobotWords, WordPlanner
 
@@ -38,7 +38,6 @@ __all__ = [
     "REQUEST_SIZE",
     "ArrivalMonitor",
     "AxisLaw",
-    "AxisMotion",
     "AxisPpc",
     "Block",
     "CellPlanner",
@@ -59,9 +58,6 @@ __all__ = [
     "MessageChannel",
     "MonitoredRobot",
     "MotionFollower",
-    "NominalAxes",
-    "NominalGovernor",
-    "NominalMotion",
     "ObjectEstimator",
     "PassingMonitor",
     "Pushes",

@@ -10,7 +10,7 @@ from pydrake.systems.framework import BasicVector, Context, DiscreteValues, Even
 from coop_drake.laws.axis_table import ENERGY_BOUND, track_row
 from coop_drake.laws.ppc import SETTLING_TIME, lagging_clock
 from coop_drake.laws.readiness import ASKS
-from coop_drake.systems.block import ALARM_SIZE, CLOCK_SIZE, CURRENT_CELL_SIZE, REQUEST_SIZE, Block, index_of
+from coop_drake.systems.block import CLOCK_SIZE, CURRENT_CELL_SIZE, REQUEST_SIZE, Block, index_of
 from coop_drake.systems.ppc import AxisLaw
 
 RELEASE = 0.5
@@ -19,7 +19,7 @@ begin a second one at once."""
 
 
 class HoldMonitor(Block):
-    """Asks for a hold while an energy is too large, Delta E negative, an alarm rings, or it hears nothing.
+    """Asks for a hold while an energy is too large, Delta E is negative, or it hears nothing.
 
     ======= =================== ========== ====================================================== =====
     input   ``object_state``    6          pose and twist of L, angle unwrapped                   W
@@ -28,8 +28,7 @@ class HoldMonitor(Block):
     input   ``clock``           3          lag, pace and its derivative of the funnels' clock
     input   ``energy_margin``   1          Delta E [m^2/s^2]
     input   ``missed``          1          1 where it misses messages of the supervisor, else 0 [-]
-    input   ``alarm``           3          what ``DepartureMonitor`` says; only with ``alarmed``
-    output  ``hold_request``    2          1 to be held, 2 for brakes, else 0; number of the message [-]
+    output  ``hold_request``    2          1 to be held, else 0; the number of the message [-]
     ======= =================== ========== ====================================================== =====
 
     State: one discrete group, whether it asks now and how many times it has updated, every step or every
@@ -39,7 +38,6 @@ class HoldMonitor(Block):
         laws: Laws of the axes (theta, q_k), one for each cell of the plan.
         energy: Largest V of an axis over the bound with which its cell may be entered [-]; None to ask only
             where messages are missed.
-        alarmed: Whether a monitor of departures asks, too.
         period: Time between updates [s], None for every step.
         offset: Time of the first update [s].
     """
@@ -49,7 +47,6 @@ class HoldMonitor(Block):
         laws: Sequence[AxisLaw],
         energy: float | None,
         *,
-        alarmed: bool = False,
         period: float | None = None,
         offset: float = 0.0,
     ) -> None:
@@ -62,7 +59,6 @@ class HoldMonitor(Block):
         self._clock = self.DeclareVectorInputPort("clock", CLOCK_SIZE)
         self._margin = self.DeclareVectorInputPort("energy_margin", 1)
         self._missed = self.DeclareVectorInputPort("missed", 1)
-        self._alarm = self.DeclareVectorInputPort("alarm", ALARM_SIZE) if alarmed else None
         self.DeclareDiscreteState(np.zeros(REQUEST_SIZE))
         self.declare_kept("hold_request", REQUEST_SIZE)
         self.declare_update(self._judge, period, offset)
@@ -73,8 +69,6 @@ class HoldMonitor(Block):
         if self._energy is not None and not asks:
             limit = self._energy * (RELEASE if asked else 1.0)
             asks = float(self._margin.Eval(context)[0] < 0.0 or self._largest_share(context) > limit)
-        if self._alarm is not None:
-            asks = max(asks, float(self._alarm.Eval(context)[0]))
         discrete_state.get_mutable_vector().SetFromVector([asks, number + 1.0])
         return EventStatus.Succeeded()
 

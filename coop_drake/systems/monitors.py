@@ -12,7 +12,7 @@ from pydrake.systems.framework import BasicVector, Context, DiscreteValues, Even
 from coop_drake.laws import readiness
 from coop_drake.laws.robot_dynamics import estimate_object, motion_room
 from coop_drake.systems.block import ALARM_SIZE, CURRENT_CELL_SIZE, Block, index_of
-from coop_drake.systems.kernels import NOMINAL_SIZE
+from coop_drake.systems.motion import STAMPED
 from coop_drake.tree.arrays import FloatArray
 
 LONG_AGO = -1e9
@@ -30,13 +30,8 @@ class MonitoredRobot:
         levels: Of position, velocity, grasp, angle of the base, infinite where there is none, and of where
             the position goes, shape (5,).
         unseen: How far ahead that is [s].
-        axis_alarms: Of the axes (theta, q_k) in every stage of every cell, of their rates, and of where both
-            take them, shape (cells, stages, 3, 1 + n), or (cells, 1, 3, 0) where they have no nominal motion.
-        alarm_times: Times since a cell's entry at which its stages begin, infinite for those that it does not
-            have, shape (cells, stages) [s].
-        start: (x, y, theta, q_k) at the beginning, shape (3 + n,).
+        axis_alarms: Of the axes (theta, q_k), of their rates, and of where both take them, shape (3, 1 + n).
         period: T [s].
-        measurement_periods: Age of the measurements in periods [-].
         offset: Time of the first computation [s].
     """
 
@@ -46,93 +41,56 @@ class MonitoredRobot:
     levels: FloatArray
     unseen: float
     axis_alarms: FloatArray
-    alarm_times: FloatArray
-    start: FloatArray
     period: float
-    measurement_periods: int
     offset: float = 0.0
 
 
 class DepartureMonitor(Block):
-    """Compares a robot's raw measurements with its nominal motion when they were made, ``laws/readiness.py``.
+    """Compares a robot's raw measurements with the motion at their time stamp, see ``laws/readiness.py``.
 
-    ======= ================ ========== ============================================================== =====
-    input   ``robot_state``  2 (3 + n)  z_k and its rate as measured, not predicted                    W
-    input   ``object_pose``  3          pose of L as measured, not predicted                           W
-    input   ``nominal``      6          what ``NominalGovernor`` shows; only p^ and p^' are read       W
-    input   ``nominal_axes`` 2 (1 + n)  x^ and x^' of the axes (theta, q_k); only where axes have such a
-                                        motion
-    input   ``current_cell`` 2          index of the current cell, time of its entry; likewise [-, s]
-    output  ``alarm``        3          0, 1 for a hold or 2 for brakes; the largest departure over its
-                                        level, and the number of this level [-]
-    ======= ================ ========== ============================================================== =====
+    ======= ================== ========== ============================================================ =====
+    input   ``robot_state``    2 (3 + n)  z_k and its rate as measured, not predicted                  W
+    input   ``object_pose``    3          pose of L as measured, not predicted                         W
+    input   ``nominal_motion`` 9 (3 + n)  what ``MotionFollower`` shows                                W
+    output  ``alarm``          3          0, 1 for a hold or 2 for brakes; the largest departure over
+                                          its level, and the number of this level [-]
+    ======= ================== ========== ============================================================ =====
 
-    State: one discrete group, updated every period: when something was above its level the last time, then
-    p^, p^', x^, x^', the current cell and the time since its entry in the last m samples, m being the age of
-    measurements in periods, the latest first.
+    State: one discrete group, updated every period: when something was above its level the last time.
+
+    Args:
+        robot: What it needs to know; its levels hold in all cells and at all times.
+        joints: Where the robot's joints stand in (x, y, theta, q).
+        coordinates: Number of coordinates of the motion, 3 + n.
     """
 
-    def __init__(self, robot: MonitoredRobot) -> None:
+    def __init__(self, robot: MonitoredRobot, joints: Sequence[int], coordinates: int) -> None:
         super().__init__()
-        self._robot, self._axes = robot, robot.axis_alarms.shape[3]
-        size = 2 * (2 + robot.mounting.size)
+        self._robot, self._axes, self._shape = robot, [2, *joints], (3, 3, coordinates)
         motion = motion_room(robot.chain)
         self._estimate = partial(estimate_object, robot.chain, robot.p_LE, motion)
         self._largest = partial(readiness.largest_departure, robot.p_LE, robot.mounting, motion[-1])
-        self._state = self.DeclareVectorInputPort("robot_state", size)
+        self._state = self.DeclareVectorInputPort("robot_state", 2 * (2 + robot.mounting.size))
         self._pose = self.DeclareVectorInputPort("object_pose", 3)
-        self._led = self.DeclareVectorInputPort("nominal", NOMINAL_SIZE)
-        if self._axes:
-            self._led_axes = self.DeclareVectorInputPort("nominal_axes", 2 * self._axes)
-            self._cell = self.DeclareVectorInputPort("current_cell", CURRENT_CELL_SIZE)
-        start = robot.start
-        self.DeclareDiscreteState(self.state_at_rest(start[:2], start[2 : 2 + self._axes], 0))
+        self._nominal = self.DeclareVectorInputPort("nominal_motion", 9 * coordinates)
+        self.DeclareDiscreteState(np.array([LONG_AGO]))
         self._alarm = self.DeclareVectorOutputPort("alarm", ALARM_SIZE, self._write_alarm)
         self.declare_update(self._remember, robot.period, robot.offset)
 
-    def state_at_rest(
-        self, position: Sequence[float] | FloatArray, axes: FloatArray, cell: int
-    ) -> FloatArray:
-        """Return the state of a monitor whose robot rests in a cell, its nominal motion where it is.
-
-        Args:
-            position: p^ [m].
-            axes: x^ of the axes that have a nominal motion [rad or m].
-            cell: Index of the cell.
-        """
-        row = np.array([*position, 0.0, 0.0, *axes[: self._axes], *[0.0] * self._axes, cell, 0.0])
-        return np.concatenate([[LONG_AGO], *[row] * self._robot.measurement_periods])
-
-    def _now(self, context: Context) -> FloatArray:
-        """Return p^, p^', x^, x^', the cell and the time since its entry, shape (6 + 2 axes,)."""
-        led = self._led.Eval(context)[:4]
-        if not self._axes:
-            return np.array([*led, 0.0, 0.0])
-        cell = self._cell.Eval(context)
-        index = index_of(cell, len(self._robot.axis_alarms))
-        return np.array([*led, *self._led_axes.Eval(context), index, context.get_time() - cell[1]])
-
     def _write_alarm(self, context: Context, output: BasicVector) -> None:
-        past, robot = self.kept(context), self._robot
-        then = past[-(6 + 2 * self._axes) :] if robot.measurement_periods else self._now(context)
-        measured, seen = self._state.Eval(context), np.empty(6)
+        robot, measured, seen = self._robot, self._state.Eval(context), np.empty(6)
+        nominal = self._nominal.Eval(context).reshape(self._shape)[STAMPED]
         self._estimate(measured, self._pose.Eval(context), seen)
-        axes, cell = then[4:-2].reshape(2, -1).copy(), int(then[-2])
-        stages = robot.alarm_times[cell], robot.axis_alarms[cell], float(then[-1])
-        share, which = self._largest(
-            measured, seen, then[:4].copy(), axes, robot.levels, *stages, robot.unseen
-        )
-        output.SetFromVector(
-            [readiness.alarm_at(share, context.get_time(), float(past[0])), share, float(which)]
-        )
+        led, axes = nominal[:2, :2].ravel(), np.ascontiguousarray(nominal[:2, self._axes])
+        levels = robot.levels, robot.axis_alarms, robot.unseen
+        share, which = self._largest(measured, seen, led, axes, *levels)
+        last = float(self.kept(context)[0])
+        output.SetFromVector([readiness.alarm_at(share, context.get_time(), last), share, float(which)])
 
     def _remember(self, context: Context, discrete_state: DiscreteValues) -> EventStatus:
-        past = self.kept(context)
-        following = discrete_state.get_mutable_vector().get_mutable_value()
-        following[0] = context.get_time() if self._alarm.Eval(context)[1] > 1.0 else past[0]
-        if self._robot.measurement_periods:
-            now = self._now(context)
-            following[1 : 1 + now.size], following[1 + now.size :] = now, past[1 : -now.size]
+        if not self._alarm.Eval(context)[1] > 1.0:
+            return EventStatus.DidNothing()
+        discrete_state.get_mutable_vector().SetAtIndex(0, context.get_time())
         return EventStatus.Succeeded()
 
 

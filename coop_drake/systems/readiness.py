@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import partial
 
 from pydrake.systems.framework import BasicVector, Context, DiscreteValues, EventStatus
 
-from coop_drake.laws.readiness import FAR, QUIET
 from coop_drake.systems import kernels
-from coop_drake.systems.block import ALARM_SIZE, CURRENT_CELL_SIZE, READY_SIZE, Block, index_of
+from coop_drake.systems.block import CURRENT_CELL_SIZE, READY_SIZE, Block, index_of
 from coop_drake.systems.governor import GovernedCell
 from coop_drake.systems.ppc import AxisLaw
 from coop_drake.tree.arrays import FloatArray
@@ -23,14 +22,11 @@ class ReadyMonitor(Block):
     input   ``robot_state``        2 (3 + n)  z_k and its rate, z_k = (x, y, yaw of Bk, q_k)         W
     input   ``governor_position``  2          p_G as the robot keeps it [m]                          W
     input   ``current_cell``       2          index of the current cell, time of its entry [-, s]
-    input   ``nominal``            6          what ``NominalGovernor`` shows; only with ``nominal``
-    input   ``alarm``              3          what ``DepartureMonitor`` says; only with ``nominal``
     input   ``arrival``            1          what ``ArrivalMonitor`` shows; only with ``measured``
     output  ``ready``              2          index of the current cell, signed margin [-]
     ======= ====================== ========== ====================================================== =====
 
-    The report is all that a robot sends to others: whether it is ready, and for which cell. With ``nominal``
-    a robot is ready where its nominal motion may enter the next cell and its monitor is quiet.
+    The report is all that a robot sends to others: whether it is ready, and for which cell.
 
     No state.
 
@@ -40,9 +36,7 @@ class ReadyMonitor(Block):
         inradii: R of every transition [m].
         goal_position: Where the object shall end, shape (2,) [m].
         position_tolerance: How close to it counts as arrived [m].
-        nominal: Whether the position is judged by its nominal motion.
         measured: Whether the robot is sampled: it judges its arrival by the means of what it measures.
-        axes_led: Whether angles and joints in the inputs are those of their nominal motions.
 
     Raises:
         ValueError: The sequences are empty or differ in length, or the tolerance is not positive.
@@ -55,10 +49,8 @@ class ReadyMonitor(Block):
         inradii: Sequence[float],
         goal_position: FloatArray,
         position_tolerance: float,
-        nominal: bool = False,
         *,
         measured: bool = False,
-        axes_led: bool = False,
     ) -> None:
         super().__init__()
         if not cells or not len(cells) == len(laws) == len(inradii):
@@ -82,12 +74,7 @@ class ReadyMonitor(Block):
         self._state = self.DeclareVectorInputPort("robot_state", 2 * (3 + n))
         self._governor = self.DeclareVectorInputPort("governor_position", 2)
         self._current = self.DeclareVectorInputPort("current_cell", CURRENT_CELL_SIZE)
-        self._nominal = self.DeclareVectorInputPort("nominal", kernels.NOMINAL_SIZE) if nominal else None
-        self._alarm = self.DeclareVectorInputPort("alarm", ALARM_SIZE) if nominal else None
         self._arrival = self.DeclareVectorInputPort("arrival", 1) if measured else None
-        last = conditions[-1]
-        known = last.table, last.goal, last.tolerance, axes_led
-        self._arrived: Callable[..., float] = partial(kernels.robot_arrived, *known)
         self.DeclareVectorOutputPort("ready", READY_SIZE, self._write_ready)
 
     def _write_ready(self, context: Context, output: BasicVector) -> None:
@@ -95,15 +82,11 @@ class ReadyMonitor(Block):
         index = index_of(current, len(self._ready))
         report[0] = index
         seen, robot = self._object.Eval(context), self._state.Eval(context)
-        led = kernels.NOTHING if self._nominal is None else self._nominal.Eval(context)
         if self._arrival is not None and index + 1 == len(self._ready):
-            report[1] = self._arrived(seen, robot, led, float(self._arrival.Eval(context)[0]))
+            report[1] = self._arrival.Eval(context)[0]
         else:
             time, governor = context.get_time() - current[1], self._governor.Eval(context)
-            report[1] = self._ready[index](time, seen, robot, governor, led)
-        if self._alarm is not None:
-            quiet = self._alarm.Eval(context)[0] == QUIET
-            report[1] = report[1] if quiet else min(report[1], FAR)
+            report[1] = self._ready[index](time, seen, robot, governor)
 
 
 class CellPlanner(Block):

@@ -175,10 +175,10 @@ class RobotWords(_Speaker):
     def _decide(self, context: Context, words: FloatArray, more: FloatArray) -> None:
         schedule, radio, time = self._schedule, self._radio, context.get_time()
         clock, motion, cell, past = time + radio.clock_error, more[:CELL], more[CELL:SAID], more[PAST:]
-        now = robot_step(schedule, clock, int(more[SAID]), radio.row, motion, words)
+        phase = robot_step(schedule, clock, int(more[SAID]), radio.row, motion, words)[0]
         past[PHASE_SIZE:] = past[:-PHASE_SIZE].copy()
-        past[:PHASE_SIZE] = now
-        index = max(int(np.searchsorted(schedule.begins, now[0], side="right")) - 1, 0)
+        past[:PHASE_SIZE] = phase_at(schedule, motion, time)  # Stamps are of one time for all robots.
+        index = max(int(np.searchsorted(schedule.begins, phase, side="right")) - 1, 0)
         if index != cell[0]:
             cell[:] = index, time
 

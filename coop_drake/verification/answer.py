@@ -20,7 +20,7 @@ from coop_drake.checking import RefusedError, check
 from coop_drake.errors import RefusalError
 from coop_drake.laws import GainSet
 from coop_drake.progress import Progress
-from coop_drake.verification.budget import check_budget, check_efforts, check_position, check_restart
+from coop_drake.verification.budget import check_departures
 from coop_drake.verification.budget_origin import ScenarioBudgets, check_origin
 from coop_drake.verification.checks import Check, Verified
 from coop_drake.verification.gains import check_accelerations, check_gains, check_limits, check_speeds
@@ -110,9 +110,7 @@ def verify_plan(
         for further in (check_speeds(plan, problem), check_accelerations(plan, problem), *kept, origin)
         if further is not None
     ]
-    checks += check_position(plan, problem.position_tolerance)
-    of_axes = check_budget(plan, problem.tree), check_restart(plan, problem.tree)
-    checks += [*(check for check in of_axes if check is not None), *check_efforts(plan)]
+    checks += check_departures(plan, problem)
     whose = f", {origin.name}" if origin is not None else ""
     return Verified(
         "found",
@@ -144,8 +142,7 @@ def _of_way(plan: Plan, problem: PlanningProblem) -> list[Check]:
             raise RefusalError(where, "is stated, but a way is made without such limits")
     found = (
         check_speeds(plan, problem),
-        check_budget(plan),
-        *check_position(plan, problem.position_tolerance),
+        *check_departures(plan, problem),
     )
     return [check for check in found if check is not None]
 

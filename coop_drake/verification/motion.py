@@ -28,7 +28,9 @@ from coop_drake.answers.plan import Plan
 from coop_drake.answers.problem import PlanningProblem
 from coop_drake.errors import RefusalError
 from coop_drake.laws import GainSet, ScheduledGains
+from coop_drake.robustness.tracking import speed_departures
 from coop_drake.tree.arrays import FloatArray, IntArray
+from coop_drake.verification.budget import check_shapes
 from coop_drake.verification.checks import Check
 from coop_drake.verification.runs.bodies import Stages, component_stages, moved
 
@@ -67,21 +69,22 @@ def check_motion(plan: Plan, problem: PlanningProblem, gain_set: GainSet) -> lis
         return []
     if plan.refused_by:
         raise RefusalError("motion", "is stated, but a plan that limits refuse has no motion")
-    if plan.budget is not None:
-        # A budget has delays and clocks: ``motion.waiting`` is to be compared with them here.
-        raise RefusalError(
-            "motion", "is stated with a budget; only motions of plans without a budget can be checked"
-        )
     if not problem.limits.base_components:
         raise RefusalError("motion", "is stated, but the problem does not say where the bases are")
     _check_ends(plan, motion, problem)
     windows = _windows(motion)
-    _check_pull(motion, gain_set)
+    if plan.budget is None:  # Otherwise gains are a free choice, from which departures follow.
+        _check_pull(motion, gain_set)
+    room, noisy = np.zeros(len(plan.start) - 2), NO_NOISE
+    if plan.budget is not None and plan.departures is not None:
+        check_shapes(plan.departures, plan.budget, problem.tree)
+        room = plan.departures.room[1:]
+        noisy = speed_departures(problem.tree, problem.limits, plan.departures)
     return [
         Check("the motion leads from the start to the goal, at rest at both ends", 2),
-        _check_stops(motion),
-        _check_cells(plan, motion, windows),
-        *_check_limits(motion, windows, problem),
+        _check_stops(motion, WAITING if plan.budget is None else 2.0 * plan.budget.words_window),
+        _check_cells(plan, motion, windows, room),
+        *_check_limits(motion, windows, problem, noisy),
     ]
 
 
@@ -147,7 +150,7 @@ def _windows(motion: Motion) -> FloatArray:
     return spans
 
 
-def _check_stops(motion: Motion) -> Check:
+def _check_stops(motion: Motion, waiting: float) -> Check:
     """Check that a stop that begins as late as it may ends before the motion leaves the cell.
 
     The pace falls from 1 to 0 within 1 / kappa + r, at -kappa but for a ramp of r at either end, and the way
@@ -156,8 +159,8 @@ def _check_stops(motion: Motion) -> Check:
     """
     if not motion.ramp > 0.0:
         raise RefusalError("motion.ramp", f"is {motion.ramp} s; expected a positive time")
-    if not motion.waiting >= WAITING:
-        raise RefusalError("motion.waiting", f"is {motion.waiting} s; expected {WAITING} s or more")
+    if not motion.waiting >= waiting * (1.0 - RELATIVE):
+        raise RefusalError("motion.waiting", f"is {motion.waiting} s; expected {waiting:g} s or more")
     last, least = len(motion.rates) - 1, inf
     for i, (tau, x) in enumerate(motion.windows[:last].tolist()):
         left, ramps = x - tau - motion.waiting, 0.5 * motion.ramp
@@ -239,16 +242,18 @@ def _prove(
 # Cells.
 
 
-def _check_cells(plan: Plan, motion: Motion, windows: FloatArray) -> Check:
+def _check_cells(plan: Plan, motion: Motion, windows: FloatArray, room: FloatArray) -> Check:
     """Check that the motion lies in each cell throughout its window: it then is as free as the cells."""
-    found = [_prove_inside(plan, motion, i, window) for i, window in enumerate(windows)]
+    found = [_prove_inside(plan, motion, i, window, room) for i, window in enumerate(windows)]
     name = "the motion lies in the cell of each window at all its times"
     return Check(name, sum(count for count, _ in found), min(gap for _, gap in found), "m or rad inside")
 
 
-def _prove_inside(plan: Plan, motion: Motion, i: int, window: FloatArray) -> tuple[int, float]:
+def _prove_inside(
+    plan: Plan, motion: Motion, i: int, window: FloatArray, kept: FloatArray
+) -> tuple[int, float]:
     """Prove that the motion lies in a cell; return of how many parts, and the least distance of a hull."""
-    region, lower, upper = plan.governed(i), plan.cells[i].lower, plan.cells[i].upper
+    region, lower, upper = plan.governed(i), plan.cells[i].lower + kept, plan.cells[i].upper - kept
     room = INSIDE * max(1.0, float(np.abs(motion.points).max()), *map(abs, region.bounds))
     shapely.prepare(region)
 
@@ -262,7 +267,7 @@ def _prove_inside(plan: Plan, motion: Motion, i: int, window: FloatArray) -> tup
         reached = ends.all(axis=1)
         return gaps, (gaps > room) & reached, ~reached
 
-    return _prove(_parts(i, *window), judge, partial(_refuse_part, plan, motion, i, window))
+    return _prove(_parts(i, *window), judge, partial(_refuse_part, plan, motion, i, window, kept))
 
 
 def _bezier_points(points: FloatArray, parts: _Parts) -> FloatArray:
@@ -277,14 +282,17 @@ def _bezier_points(points: FloatArray, parts: _Parts) -> FloatArray:
     return np.stack(found, axis=1)
 
 
-def _refuse_part(plan: Plan, motion: Motion, i: int, window: FloatArray, parts: _Parts) -> NoReturn:
+def _refuse_part(
+    plan: Plan, motion: Motion, i: int, window: FloatArray, kept: FloatArray, parts: _Parts
+) -> NoReturn:
     """Refuse a cell's window where the motion is outside as it begins or ends, else a control point."""
     z, cell = _bezier_points(motion.points, parts)[0], plan.cells[i]
-    outside = np.maximum(cell.lower - z[:, 2:], z[:, 2:] - cell.upper)
+    outside = np.maximum(cell.lower + kept - z[:, 2:], z[:, 2:] - cell.upper + kept)
     point, axis = (int(k) for k in np.unravel_index(np.argmax(outside), outside.shape))
     if outside[point, axis] > -INSIDE:
         what = f"{_axis(plan, axis)} may be {z[point, 2 + axis]:.9g}; cells[{i}] has"
         what += f" [{cell.lower[axis]}, {cell.upper[axis]}]"
+        what += f", of which {kept[axis]:.6g} at either end are for departures" if kept[axis] else ""
     else:
         region = (
             f"cells[{i}].tidied" if plan.transitions[i].governed is None else f"transitions[{i}].governed"
@@ -361,8 +369,18 @@ class _Mover(NamedTuple):
         return third, fourth
 
 
-def _movers(problem: PlanningProblem) -> Iterator[_Mover]:
-    """List the object, the bases, their angles and the joints, with their limits, or defaults for these."""
+NO_NOISE = np.zeros(0)
+"""Where no budget has noise."""
+
+
+def _movers(problem: PlanningProblem, noisy: FloatArray = NO_NOISE) -> Iterator[_Mover]:
+    """List the object, the bases, their angles and the joints, with their limits, or defaults for these.
+
+    Limits of speed are less by what noise adds, of which that of all bases, then of their angles, and of the
+    joints is given, if any.
+    """
+    bases = len(problem.limits.base_components)
+    noisy = noisy if noisy.size else np.zeros(2 * bases + len(problem.tree.joints))
     of, joints = problem.limits, problem.tree.joints
     unit = np.eye(3 + len(joints))
 
@@ -373,19 +391,19 @@ def _movers(problem: PlanningProblem) -> Iterator[_Mover]:
     yield _Mover("the object", "m", inf, most, unit[:2])
     for k, (component, point) in enumerate(zip(of.base_components, of.base_points, strict=True)):
         stages = component_stages(problem.tree, component)
-        speed = known(of.base_speeds, k, defaults.BASE_SPEED)
+        speed = known(of.base_speeds, k, defaults.BASE_SPEED) - noisy[k]
         most = known(of.base_accelerations, k, defaults.BASE_ACCELERATION)
         jerk = known(of.base_jerks, k, defaults.BASE_JERK)
         yield _Mover(f"base {k}", "m", speed, most, None, jerk, ((1.0, stages, point),))
         yield from _centre(
             problem, k, known(of.frictions, k, defaults.FRICTION), known(of.base_forces, k, inf)
         )
-        speed = known(of.turn_rates, k, defaults.TURN_RATE)
+        speed = known(of.turn_rates, k, defaults.TURN_RATE) - noisy[bases + k]
         most = known(of.turn_accelerations, k, defaults.TURN_ACCELERATION)
         signs = [stage.sign * unit[3 + stage.index] for stage in stages if stage.kind == "revolute"]
         yield _Mover(f"the angle of base {k}", "rad", speed, most, np.sum(signs, axis=0, keepdims=True))
     for joint in joints:
-        speed = known(of.joint_rates, joint.index, defaults.JOINT_RATE)
+        speed = known(of.joint_rates, joint.index, defaults.JOINT_RATE) - noisy[2 * bases + joint.index]
         most = known(of.joint_accelerations, joint.index, defaults.JOINT_ACCELERATION)
         yield _Mover(joint.name, joint.unit, speed, most, unit[[3 + joint.index]])
 
@@ -401,7 +419,9 @@ def _centre(problem: PlanningProblem, k: int, friction: float, force: float) -> 
         yield _Mover(f"the centre of all that base {k} moves", "m", inf, most, None, points=points)
 
 
-def _check_limits(motion: Motion, windows: FloatArray, problem: PlanningProblem) -> list[Check]:
+def _check_limits(
+    motion: Motion, windows: FloatArray, problem: PlanningProblem, noisy: FloatArray
+) -> list[Check]:
     """Check speeds and accelerations, in stops and starts, too, and mean jerks.
 
     In a start from any phase, rho' is at most alpha (1 - rho^2), so that rho^2 A + rho' V lies between A and
@@ -411,7 +431,7 @@ def _check_limits(motion: Motion, windows: FloatArray, problem: PlanningProblem)
     begins = [0.0, *((motion.windows[:-1, 0] + motion.waiting) / motion.period).tolist()]
     ways = [_parts(i, begin, end) for i, (begin, end) in enumerate(zip(begins, windows[:, 1], strict=True))]
     every = _Parts(*(np.concatenate([getattr(way, name) for way in ways]) for name in _Parts._fields))
-    movers = list(_movers(problem))
+    movers = list(_movers(problem, noisy))
     found = [_prove_limits(motion, mover, every) for mover in movers]
     name = "limits of speed and acceleration are kept at all times, in stops and starts, too"
     kept = Check(

@@ -32,7 +32,7 @@ from coop_drake.scenario import (
 )
 from coop_drake.simulation import communication, run_loop, simulate
 from coop_drake.verification.runs import verify_log
-from tests.support.motions import small_motion
+from tests.support.motions import motion_under_budget, small_motion
 from tests.support.same_runs import differences
 from tests.support.small_loop import sampled, small_maps
 
@@ -473,6 +473,15 @@ def test_a_passing_team_of_which_a_robot_is_killed_rests_on_its_motion_and_goes_
     assert 0.6 < stop["rested"] < stop["resumed"] < log.times[-1]
     assert nothing_touched(log)
     assert log.cell_clearance.min() > 0.0
+
+
+def test_clocks_that_are_more_wrong_than_the_plan_allows_stop_the_team():
+    scenario, plan = motion_under_budget()
+    wrong = replace(scenario.deployment, clock_error=0.02)
+    log, _, _ = run((replace(scenario, deployment=wrong), plan))
+    assert not log.reached
+    assert log.times[-1] < 1.0
+    assert "measurements are older than the plan allows, or have stamps that cannot be" in log.violation
 
 
 def test_a_passing_team_of_which_a_robot_stays_away_ends_at_rest():

@@ -33,7 +33,11 @@ from coop_drake.scenario.budget_file import wave_bounds
 from coop_drake.scenario.deployment import Wave, Waves
 from tests.support.scenarios import write_scenario
 
-ASKED = {"set": {"deployment.preset": "mobile_base"}, "budget": "all", "scenarios": ["room.scenario.yaml"]}
+ASKED = {
+    "set": {"deployment.preset": "mobile_base", "planner.hand_over": "pass"},
+    "budget": "all",
+    "scenarios": ["room.scenario.yaml"],
+}
 BROKEN = {**ASKED, "departures": ["angles", "model"], "runs": 2, "halvings": 6, "seed": 5}
 WAVES = "deployment.measurements.waves"
 
@@ -42,7 +46,9 @@ WAVES = "deployment.measurements.waves"
 def allowed(tmp_path_factory):
     """The departures that the whole budget of a preset allows, and the team."""
     file = tmp_path_factory.mktemp("room") / "room.scenario.yaml"
-    scenario = coop_drake.load_scenario(write_scenario(file, deployment={"preset": "mobile_base"}))
+    scenario = coop_drake.load_scenario(
+        write_scenario(file, deployment={"preset": "mobile_base"}, planner={"hand_over": "pass"})
+    )
     problem = planning_problem(scenario)
     return BoundedDepartures(budget_of("all", scenario, problem), problem.tree), problem.tree
 
@@ -172,7 +178,8 @@ def test_where_nothing_is_lost_bisection_says_how_far_it_looked_and_tries_nothin
 @pytest.fixture(scope="module")
 def study(tmp_path_factory):
     folder = tmp_path_factory.mktemp("searches")
-    write_scenario(folder / "room.scenario.yaml")
+    goal = {"object": {"x": 3.5, "y": 2.0, "theta": 0.0}, "tolerances": {"position": 0.015}}
+    write_scenario(folder / "room.scenario.yaml", goal=goal)
     file = folder / "room.study.yaml"
     file.write_text(yaml.safe_dump({"searches": {**ASKED, "evaluations": 2, "seed": 4}, "breaking": BROKEN}))
     return load_study(file)

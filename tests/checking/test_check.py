@@ -163,7 +163,7 @@ TEAM = {
 def plan(lower=0.2, upper=0.6):
     path = [[2, 4], [3, 4]]
     return {
-        "format": "coop_drake plan", "version": 5,
+        "format": "coop_drake plan", "version": 6,
         "cells": [{"lower": [-0.1, lower], "upper": [0.1, upper], "tidied": rectangle(1.5, 3.5, 4, 4.5)}],
         "transitions": [{
             "target": [3, 4], "goal_lower": [-0.01, 0.49], "goal_upper": [0.01, 0.51], "path": path,

@@ -25,7 +25,7 @@ from tests.support.small_scenario import small_scenario
 from tests.support.turret import write_turret
 
 SAMPLED = "deployment: {control_rate: 100}"
-BUDGET = "deployment: {preset: mobile_base, budget: all}"
+BUDGET = "planner: {hand_over: pass}\ndeployment: {preset: mobile_base, budget: all}"
 
 
 class Wrapping(DirectExchange):

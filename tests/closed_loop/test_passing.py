@@ -248,10 +248,6 @@ def test_words_that_are_later_than_the_motion_allows_are_refused() -> None:
 @pytest.mark.parametrize(
     ("text", "key"),
     [
-        (
-            "planner: {hand_over: pass}\ndeployment: {preset: mobile_base, budget: position}",
-            "planner.hand_over",
-        ),
         ("planner: {hand_over: stop}", "planner.hand_over"),
     ],
 )

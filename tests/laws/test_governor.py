@@ -1,7 +1,5 @@
 """The governor: its law, energies, and hand-overs, in which gains and accelerations move smoothly."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -12,15 +10,12 @@ from shapely import box
 from coop_drake import laws
 from coop_drake.geometry.polygons import edges_of
 from coop_drake.laws.axis_table import (
-    GOAL_LOWER,
-    GOAL_UPPER,
-    LEAVING_TIME,
     axis_table,
     track_axes,
     track_row,
     write_jumps,
 )
-from coop_drake.laws.gains import RestCondition, schedule_of
+from coop_drake.laws.gains import schedule_of
 from coop_drake.laws.governor import ATTRACTION_RATE, VELOCITY_STEP
 from coop_drake.laws.ppc import STEEPEST, fading, governed_gains, shortest_hand_over
 from coop_drake.scenario import SimulatorSettings
@@ -191,19 +186,6 @@ def test_an_axis_stays_in_its_funnel_whatever_the_jump(start, speed, jump):
     energies = [track_row(table[0], t, *z)[1] for t, z in zip(run.t, run.y.T, strict=True)]
     assert max(energies) <= energies[0] + jump**2 * T / (8.0 * gains.rate_gain) + 1e-6
     assert 0.0 < run.y[0].min() <= run.y[0].max() < 1.0
-
-
-def test_at_rest_the_next_law_begins_with_no_acceleration():
-    """The jump is that of the goal interval's middle, whatever the state is in which the cell is left."""
-    gains = gains_of(0.1)
-    rest = RestCondition(0.2, np.array([0.03]), np.array([0.1]))
-    table, next_table = table_of(replace(gains, rest=rest)), table_of(gains_of(0.1))
-    state, jumps, after = np.array([0.0, 0.0, 0.8, 0.0, 0.0, 0.1]), *np.empty((2, 1))
-    write_jumps(table, next_table, 0.4, ON_TIME, state, state, jumps)
-    state[2], state[5] = 0.5 * (table[0, GOAL_LOWER] + table[0, GOAL_UPPER]), 0.0
-    track_axes(next_table, 0.0, ON_TIME, jumps, state, state, after)
-    assert after == pytest.approx(0.0, abs=1e-12)
-    assert table[0, LEAVING_TIME] == 0.2
 
 
 def test_with_its_jump_the_next_law_begins_where_the_last_one_ends():

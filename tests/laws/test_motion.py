@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.interpolate import BSpline
 
-from coop_drake.laws.motion import motion_at, pulled
+from coop_drake.laws.motion import motion_at, pull
 
 PERIOD = 0.3
 
@@ -37,6 +37,15 @@ def test_it_rests_before_its_beginning_and_after_its_end(points, phase) -> None:
 
 
 def test_a_departure_is_pulled_to_zero() -> None:
-    nominal = np.array([[1.0, 2.0], [0.1, 0.2], [0.5, 0.7]])
-    assert pulled(nominal, 1, 2.0, 0.2, 9.0, 6.0) == 0.7
-    assert pulled(nominal, 1, 2.1, 0.5, 9.0, 6.0) == pytest.approx(0.7 - 9.0 * 0.1 - 6.0 * 0.3)
+    """A team whose robot has one joint, the second of the tree."""
+    expected = np.array([[1.0, 2.0, 0.3, 9.0, 0.4], [0.1, 0.2, 0.3, 9.0, 0.5], [9.0] * 5])
+    ahead = np.vstack([[9.0] * 5, [9.0] * 5, [0.5, 0.6, 0.7, 9.0, 0.8]])
+    at, found = (expected[0, :3], expected[1, :3], expected[:2, 4]), np.empty(4)
+    for off in (0.0, 0.1):
+        places, rates = at[0] + off * np.array([1, 2, 3]), at[1] - off * np.array([1, 2, 3])
+        robot = np.zeros(8)
+        robot[[3, 7]] = at[2] + off * np.array([4, -4])
+        gains = np.array([9.0, 6.0, 16.0, 8.0])
+        pull(ahead, expected, np.array([4]), gains, np.concatenate([places, rates]), robot, found)
+        pulled = off * np.array([3.0, 6.0, 8.0 * 3.0, 8.0 * 4.0])
+        np.testing.assert_allclose(found, [0.5, 0.6, 0.7, 0.8] - pulled, atol=1e-12)

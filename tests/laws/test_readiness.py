@@ -8,7 +8,6 @@ import pytest
 
 from coop_drake.laws import Funnel, ScheduledGains, readiness, transition_gains
 from coop_drake.laws.axis_table import ENERGY_BOUND, axis_table, track_row
-from coop_drake.laws.gains import RestCondition
 from coop_drake.systems.kernels import ready_conditions
 from tests.support.readiness import margin_of, square_with_clearance
 
@@ -108,25 +107,6 @@ def test_a_certified_error_that_jumps_does_not_keep_it_from_arriving_for_ever():
     assert arrived > 20
 
 
-def test_a_departure_is_unseen_for_delay_report_and_one_period_in_whole_periods():
-    assert readiness.unseen_time(0.01, 0.025, 0.005, 0.0) == pytest.approx(0.04)
-    assert readiness.unseen_time(0.011, 0.0, 0.005, 0.0) == pytest.approx(0.02)
-    assert readiness.unseen_time(0.011, 0.0, 0.005, 0.001) == pytest.approx(
-        0.021
-    )  # what clocks hide of the age
-
-
-@pytest.mark.parametrize(("time", "stage"), [(-0.005, 0), (0.0, 0), (0.29, 0), (0.3, 1), (1.0, 2), (1e9, 2)])
-def test_a_stage_lasts_from_its_time_to_that_of_the_next_one(time, stage):
-    levels = np.array([[[1.0], [inf], [inf]], [[0.5], [inf], [inf]], [[0.25], [inf], [inf]]])
-    hand, seen, still = np.zeros(15), np.array([0.0, 0.0, 0.1, 0.0, 0.0, 0.0]), np.zeros((2, 1))
-    share, which = readiness.largest_departure(
-        np.zeros(2), np.zeros(1), hand, np.zeros(6), seen, np.zeros(4), still, np.full(5, inf),
-        np.array([0.0, 0.3, 1.0, inf]), levels, time, 0.02,
-    )  # fmt: skip
-    assert (share, which) == (pytest.approx(0.1 / levels[stage, 0, 0]), 5)
-
-
 def test_a_monitor_asks_above_its_level_and_a_little_longer_and_brakes_above_twice_the_level():
     long_ago = -1e9
     assert readiness.alarm_at(1.0, 5.0, long_ago) == readiness.QUIET
@@ -205,21 +185,6 @@ def test_the_next_cell_is_judged_by_the_stiffness_that_it_is_entered_with():
 def test_a_robot_is_ready_only_once_the_last_hand_over_is_over():
     assert ready(time=NEXT_GAINS.hand_over_time) >= 0.0
     assert ready(time=0.9 * NEXT_GAINS.hand_over_time) < 0.0
-
-
-def test_a_cell_that_is_left_at_rest_asks_for_place_and_rate_in_place_of_the_energy():
-    gains = transition_gains(ScheduledGains(), clearance=0.2, resting=np.array([0.4, 0.5]), **INTERVALS)
-    gains = replace(gains, rest=RestCondition(0.5, np.array([0.05, 0.1]), np.array([0.2, 0.3])))
-    funnel = Funnel(**INTERVALS, decay_rate=gains.decay_rate, shape=gains.funnel)
-    table, alone = (
-        axis_table(funnel, gains),
-        axis_table(funnel.select(np.array([1])), gains.select(np.array([1]))),
-    )
-    assert min(readiness.axis_ready(table[0], NEXT_TABLE[0], 0.9, 0.05)) == pytest.approx(0.75)
-    assert min(readiness.axis_ready(table[0], NEXT_TABLE[0], 0.88, 0.05)) == pytest.approx(0.6)
-    assert min(readiness.axis_ready(table[0], NEXT_TABLE[0], 0.96, 0.0)) < 0.0
-    assert min(readiness.axis_ready(table[0], NEXT_TABLE[0], 0.9, -0.21)) < 0.0
-    assert min(readiness.axis_ready(alone[0], NEXT_TABLE[1], 0.0, 0.15)) == pytest.approx(0.5)
 
 
 @pytest.mark.parametrize(

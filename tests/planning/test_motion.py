@@ -32,20 +32,33 @@ class Case:
         knots = self.motion.period * (np.arange(len(self.motion.points) + 4) - 3.0)
         self.spline = BSpline(knots, self.motion.points, 3)
 
-    def used(self, seconds: FloatArray, way: FloatArray) -> tuple[float, float, float]:
-        """Return the largest shares of the limits of speed, acceleration and jerk by differences."""
+    def used(self, seconds: FloatArray, way: FloatArray) -> tuple[float, float]:
+        """Return the largest shares of the limits of speed and acceleration by differences."""
+        parts, step, shares = self._parts(way), seconds[1] - seconds[0], []
+        for order in range(2):
+            of = [np.linalg.norm(np.diff(part, order + 1, axis=0), axis=1) for part in parts]
+            shares.append(self._share(of, order) / step ** (order + 1))
+        return shares[0], shares[1]
+
+    def used_of_jerk(self) -> float:
+        """Return the largest share of the limits of jerk in the mean over a span, by differences."""
+        period, step = self.motion.period, 1e-4
+        times = np.arange(1, len(self.motion.points) - 3) * period
+        before, at, after = (self._parts(self.spline(times + shift)) for shift in (-step, 0.0, step))
+        of = [
+            np.linalg.norm(np.diff(a - 2.0 * b + c, axis=0), axis=1)
+            for a, b, c in zip(before, at, after, strict=True)
+        ]
+        return self._share(of, 2) / (step * step * period)
+
+    def _parts(self, way: FloatArray) -> list[FloatArray]:
+        """Return the places of the object and of the bases, then the bases' angles and all joints."""
         bases = base_places(base_chains(self.problem.tree, self.bases), way)
         places = np.concatenate([way[None, :, :2], bases[..., :2]])
-        angles = np.concatenate([bases[..., 2], way[:, 3:].T])[..., None]
-        step, shares = seconds[1] - seconds[0], []
-        for order in range(3):
-            of = [np.hypot(*np.diff(p, order + 1, axis=0).T) for p in places]
-            of += [np.abs(np.diff(a, order + 1, axis=0)) for a in angles]
-            limits = self.limits[: len(of), order]
-            shares.append(
-                max(float(x.max()) / step ** (order + 1) / y for x, y in zip(of, limits, strict=True))
-            )
-        return shares[0], shares[1], shares[2]
+        return [*places, *np.concatenate([bases[..., 2], way[:, 3:].T])[..., None]]
+
+    def _share(self, of: list[FloatArray], order: int) -> float:
+        return max(float(x.max()) / y for x, y in zip(of, self.limits[: len(of), order], strict=True))
 
 
 @pytest.fixture(scope="module", params=["base", "elbow"])
@@ -76,7 +89,7 @@ def test_it_lies_in_its_cells_which_follow_each_other(case: Case) -> None:
 
 def test_all_limits_are_kept_and_used(case: Case) -> None:
     seconds = np.linspace(0.0, case.motion.duration, 20001)
-    for share in case.used(seconds, case.spline(seconds)):
+    for share in (*case.used(seconds, case.spline(seconds)), case.used_of_jerk()):
         assert 0.9 < share <= 1.0
 
 
@@ -103,7 +116,7 @@ def test_the_team_can_brake_at_any_time_before_it_leaves_the_cell_it_may_enter(c
             phase = sigma + np.append(0.0, np.cumsum(0.5 * (pace[1:] + pace[:-1]) * 1e-3))
             assert abs(pace[-1]) < 0.02
             assert phase[-1] <= motion.windows[index, 1] + 1e-3
-            fast, hard, _ = case.used(times, case.spline(np.minimum(phase, motion.duration)))
+            fast, hard = case.used(times, case.spline(np.minimum(phase, motion.duration)))
             assert fast <= 1.0
             assert hard <= 1.0 + 5e-3
 

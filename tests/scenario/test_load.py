@@ -129,7 +129,7 @@ def test_the_preset_stands_for_its_departures(tmp_path):
     assert (read.control_rate, read.mass_error, read.messages.loss) == (200.0, 0.2, 0.2)
     assert (read.measurements.delay, read.measurements.position_noise) == (0.01, 0.001)
     assert (read.actuators.base_force, read.actuators.lag) == (650.0, 0.005)
-    assert read.command_age == pytest.approx(0.0175)
+    assert read.command_age == pytest.approx(0.0195)
 
 
 def test_keys_beside_the_preset_replace_its_own_and_no_others(tmp_path):

@@ -6,7 +6,7 @@ import numpy as np
 from shapely import box
 
 from coop_drake.geometry.polygons import edges_of
-from coop_drake.systems.kernels import NOTHING, robot_ready
+from coop_drake.systems.kernels import robot_ready
 
 
 def states(position, velocity, axes, rates):
@@ -18,7 +18,7 @@ def states(position, velocity, axes, rates):
 def margin_of(conditions, position, velocity, governor_position, axes, rates, time=10.0):
     """Return ``robot_ready`` of a robot whose conditions are given, ``time`` [s] after the cell's entry."""
     governor = np.array(governor_position, dtype=float)
-    return robot_ready(conditions, time, *states(position, velocity, axes, rates), governor, NOTHING)
+    return robot_ready(conditions, time, *states(position, velocity, axes, rates), governor)
 
 
 def square_with_clearance(point, clearance):

@@ -34,7 +34,6 @@ from coop_drake.systems import Block
 from coop_drake.systems.block import ALARM_SIZE
 from coop_drake.systems.departures import tilt_floor
 from coop_drake.systems.holds import ASKED, BRAKED, SILENT, TOLD
-from coop_drake.systems.kernels import nominal_margins
 from coop_drake.tree.arrays import FloatArray
 
 SHOWN = 23
@@ -75,7 +74,6 @@ def tell(
     instant[0], instant[1], instant[2] = current[0], current[1], 1.0 if arrived else 0.0
     robot, governors = np.empty(memory.state.size), memory.governors.copy()
     compute(sample, number, now, True, cells, team, nominal, departures, room, memory)
-    led = memory.nominal[sample % memory.nominal.shape[0]]
     for k in range(robots):
         row, begin = shown[k], k + team.first[2, k]
         end = begin + 1 + team.first[2, k + 1] - team.first[2, k]
@@ -84,11 +82,8 @@ def tell(
         base = team.base_chains[team.first[1, k] : team.first[1, k + 1]]
         read_robot(base, team.yaws[k], joints, room.motion, memory.state, robot)
         row[POSE : POSE + 3] = robot[:3]
-        row[GOVERNOR : GOVERNOR + 2] = led[4:6] if nominal.flow.size else governors[k]
+        row[GOVERNOR : GOVERNOR + 2] = governors[k]
         row[MARGIN] = room.told[k, arrays.ENERGY]
-        if nominal.flow.size:
-            edges = cells.governed[cells.first[0, heard] : cells.first[0, heard + 1]]
-            row[MARGIN], _ = nominal_margins(edges, cells.numbers[heard, 1], led, led[4:6])
         if passes:
             heard, clock = int(memory.reports[0, k, 0]), now + departures.hearing[0, k]
             row[PHASE], row[PHASE + 1], row[PHASE + 2] = words.phase_at(

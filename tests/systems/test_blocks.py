@@ -41,13 +41,12 @@ from coop_drake.scenario import (
     Silence,
     WheelSlip,
 )
-from coop_drake.simulation import build_maps
+from tests.support.motions import motion_under_budget
 from tests.support.robot_matrices import turned
 from tests.support.small_loop import small_maps, small_problem
 from tests.support.small_plan import with_motion
 from tests.support.small_scenario import small_scenario
 from tests.support.system_checks import SIZE_OF_ABSTRACT, evaluate, port_sizes, state_of
-from tests.support.tubes import WITH_AXES, tubed_problem
 
 ROW = re.compile(r"^ *(input|output) +``(\S+)`` +(\S(?:.*?\S)?)(?:  |$)", re.MULTILINE)
 
@@ -81,13 +80,13 @@ def leaves(system):
 @pytest.fixture(scope="module")
 def blocks():
     """One of each block: from loops with a budget, one that is sampled, and one whose robots are separate."""
-    own, (scenario, plan) = small_problem("base"), tubed_problem(WITH_AXES)
-    tubed, hold = (scenario, plan, build_maps(plan)), Control(hold=Hold(at=(1.0,)))
+    own, (scenario, plan) = small_problem("base"), motion_under_budget()
+    led, hold = (scenario, plan, small_maps()), Control(hold=Hold(at=(1.0,)))
     everything = {"deployment": EVERYTHING, "control": Control(predictor=True, observer=True, hold=Hold())}
     separate = {"plant": PlantSettings(grasps="constraints")}
     found = {}
     for (scenario, plan, maps), changes in (
-        (tubed, {"control": hold}),
+        (led, {"control": hold}),
         ((*own, small_maps()), everything),
         ((*own, small_maps()), separate),
     ):
@@ -161,8 +160,6 @@ def test_only_switches_jumps_holds_what_is_predicted_and_what_models_failures_ar
         "ArrivalMonitor",
         "AxisPpc",
         "StatePredictor",
-        "NominalAxes",
-        "NominalGovernor",
         "RobotWords",
         "WordPlanner",
     }

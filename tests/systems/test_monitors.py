@@ -8,18 +8,18 @@ import pytest
 from pydrake.systems.analysis import Simulator
 
 from coop_drake.diagram import build_station
-from coop_drake.diagram.robot_controller import hold_of, robot_knowledge
-from coop_drake.errors import PlanError
+from coop_drake.diagram.robot_controller import robot_knowledge
+from coop_drake.errors import ScenarioError
 from coop_drake.laws.readiness import FAR, ArrivalGoal, arrival_margin, mean_samples
-from coop_drake.scenario import Deployment, Hold, Measurements
-from coop_drake.simulation import build_maps
+from coop_drake.scenario import Deployment
 from coop_drake.systems import ArrivalMonitor, DepartureMonitor, ReadyMonitor, axis_laws
 from coop_drake.systems.kernels import ready_conditions
+from coop_drake.systems.motion import STAMPED
+from tests.support.motions import motion_under_budget
 from tests.support.readiness import margin_of
-from tests.support.small_loop import governed_cells
+from tests.support.small_loop import governed_cells, small_maps
 from tests.support.small_plan import GOAL_POSE, POSITION_TOLERANCE, small_plan, stiffer_and_stiffer
 from tests.support.system_checks import context_with, evaluate, port_sizes
-from tests.support.tubes import BUDGET, WITH_AXES, tubed_problem
 
 PLAN = stiffer_and_stiffer(small_plan(("a", "b", "c")))
 
@@ -86,40 +86,16 @@ def test_bad_parameters_are_refused(cells):
         ReadyMonitor(cells, laws, [0.1, 0.1, 0.1], goal, 0.0)
 
 
-@pytest.mark.parametrize("axes_led", [False, True])
-def test_in_the_last_cell_a_sampled_robot_says_what_it_measures_besides_what_leads_it(cells, axes_led):
+def test_in_the_last_cell_a_sampled_robot_says_what_it_measures(cells):
     inradii = [transition.inradius for transition in PLAN.transitions]
     parts = cells, axis_laws(PLAN, AXES), inradii, PLAN.goal_pose[:2], POSITION_TOLERANCE
-    sampled, last = ReadyMonitor(*parts, measured=True, axes_led=axes_led), len(cells) - 1
-    middle = 0.5 * (PLAN.transitions[-1].goal_lower + PLAN.transitions[-1].goal_upper)
-    inputs = {
-        **INPUTS,
-        "object_state": [*PLAN.goal_pose[:2], middle[0], 0.0, 0.0, 0.0],
-        "robot_state": [1.0, 2.0, 0.3, middle[2], middle[3], *[0.0] * 5],
-        "current_cell": [last, 0.0],
-        "arrival": [0.4],
-    }
+    sampled, last = ReadyMonitor(*parts, measured=True), len(cells) - 1
+    inputs = {**INPUTS, "current_cell": [last, 0.0], "arrival": [0.4]}
     assert evaluate(sampled, inputs, "ready").tolist() == [last, 0.4]
     assert evaluate(sampled, {**inputs, "arrival": [-1.0]}, "ready").tolist() == [last, -1.0]
-    moving = {**inputs, "object_state": [*inputs["object_state"][:5], 0.03]}
-    assert (evaluate(sampled, moving, "ready")[1] < 0.0) == axes_led  # else the rate is a noisy measurement
     before = {**inputs, "current_cell": [0.0, 0.0], "arrival": [-1.0]}
     expected = evaluate(ReadyMonitor(*parts), {name: before[name] for name in INPUTS}, "ready")
     np.testing.assert_array_equal(evaluate(sampled, before, "ready"), expected)
-
-
-def test_no_robot_is_ready_while_its_monitor_is_not_quiet(cells):
-    inradii = [transition.inradius for transition in PLAN.transitions]
-    parts = cells, axis_laws(PLAN, AXES), inradii, PLAN.goal_pose[:2], POSITION_TOLERANCE
-    led = ReadyMonitor(*parts, nominal=True, measured=True)
-    inputs = {
-        **INPUTS,
-        "current_cell": [2.0, 0.0],
-        "nominal": [*PLAN.goal_pose[:2], 0.0, 0.0, 0.0, 0.0],
-    }
-    for alarm, arrival, expected in ((0.0, 0.4, 0.4), (1.0, 0.4, -1.0), (2.0, 0.4, -1.0), (1.0, -2.0, -2.0)):
-        report = evaluate(led, {**inputs, "arrival": [arrival], "alarm": [alarm, 1.1, 0.0]}, "ready")
-        assert report.tolist() == [2.0, expected]
 
 
 @pytest.fixture(scope="module")
@@ -168,22 +144,12 @@ def arrivals():
     return ArrivalMonitor(ARRIVAL, CELLS, PERIOD)
 
 
-NOISY = replace(WITH_AXES, grasp_noise=0.01, turn_noise=0.006)
-
-
-DELAY = 2
-"""Age of measurements in periods."""
-
-
 @cache
-def known(budget=NOISY):
+def known():
     """What robot 1 is given, and what it measures at the plan's start."""
-    scenario, plan = tubed_problem(budget)
-    measurements = Measurements(delay=DELAY / budget.control_rate)
-    deployment = Deployment(control_rate=budget.control_rate, measurements=measurements)
-    scenario = replace(scenario, deployment=deployment)
+    scenario, plan = motion_under_budget()
     station = build_station(scenario)
-    robot = robot_knowledge(scenario, plan, build_maps(plan), station.team)[1]
+    robot = robot_knowledge(scenario, plan, small_maps(), station.team)[1]
     context = station.diagram.CreateDefaultContext()
     plant = station.team.plant
     state = station.team.plant_state(plan.start, np.zeros(len(plan.start)))
@@ -193,34 +159,30 @@ def known(budget=NOISY):
     return robot, pose, own
 
 
-def inputs(budget=NOISY):
-    """Inputs of a monitor whose robot rests at the plan's start."""
-    _, pose, own = known(budget)
-    given = {"robot_state": own, "object_pose": pose, "nominal": [*pose[:2], 0.0, 0.0, 0.0, 0.0]}
-    if not budget.axes:
-        return given
-    axes = np.array([pose[2], *own[3 : len(own) // 2]])
-    return given | {"nominal_axes": [*axes, *np.zeros_like(axes)], "current_cell": [0.0, 0.0]}
+def inputs():
+    """Inputs of a monitor whose robot rests at the plan's start; only the motion at the stamp is read."""
+    robot, pose, own = known()
+    nominal = np.full((3, 3, robot.plan.start.size), np.nan)
+    nominal[STAMPED, 0], nominal[STAMPED, 1] = robot.plan.start, 0.0
+    return {"robot_state": own, "object_pose": pose, "nominal_motion": nominal.ravel()}
 
 
-def departure_monitor(budget=NOISY):
-    return DepartureMonitor(known(budget)[0].monitored)
+def departure_monitor():
+    robot = known()[0]
+    joints = range(3 + robot.joints.start, 3 + robot.joints.stop)
+    return DepartureMonitor(robot.monitored, joints, robot.plan.start.size)
 
 
-def test_ports_and_a_robot_at_rest_on_its_nominal_motion():
-    block, axes = departure_monitor(), known()[0].monitored.mounting.size
+def test_ports_and_a_robot_at_rest_on_its_motion():
+    block, own = departure_monitor(), known()[0]
+    axes = own.monitored.mounting.size
     assert port_sizes(block) == (
-        {
-            "robot_state": 2 * (2 + axes), "object_pose": 3, "nominal": 6, "nominal_axes": 2 * axes,
-            "current_cell": 2,
-        },
+        {"robot_state": 2 * (2 + axes), "object_pose": 3, "nominal_motion": 9 * own.plan.start.size},
         {"alarm": 3},
-    )  # fmt: skip
+    )
     alarm, share, _ = evaluate(block, inputs(), "alarm")
     assert alarm == 0.0
     assert share == pytest.approx(0.0, abs=1e-9)
-    assert port_sizes(departure_monitor(BUDGET))[0].keys() == {"robot_state", "object_pose", "nominal"}
-    assert evaluate(departure_monitor(BUDGET), inputs(BUDGET), "alarm")[0] == 0.0
 
 
 def departures():
@@ -240,7 +202,7 @@ def departures():
         return {"object_pose": state["object_pose"], "robot_state": [*state["robot_state"][:n], *rates]}
 
     def going(size):
-        return faster(0.5 * size / unseen, unseen)
+        return faster(0.2 * size / unseen, 4.0 * unseen)
 
     def slipped(size):
         return {"robot_state": [*(own[:2] + size * np.array([0.6, -0.8])), *own[2:]]}
@@ -257,7 +219,7 @@ def departures():
         return {"object_pose": state["object_pose"], "robot_state": [*state["robot_state"][:n], *rates]}
 
     def turning_on(size):
-        return turning(0.5 * size / unseen, -1.0)
+        return turning(0.2 * size / unseen, -4.0)
 
     first = 5 + n - 2
     return {
@@ -270,7 +232,7 @@ def test_what_departs_is_compared_with_its_level(check):
     own = known()[0].monitored
     axes = own.mounting.size
     assert axes == 2
-    level = own.levels[check] if check < 5 else own.axis_alarms[0, 0].ravel()[check - 5]
+    level = own.levels[check] if check < 5 else own.axis_alarms.ravel()[check - 5]
     for share, alarm in ((0.9, 0.0), (1.1, 1.0), (2.1, 2.0)):
         measured = departures()[check](share * level)
         found = evaluate(departure_monitor(), inputs() | measured, "alarm")
@@ -285,50 +247,27 @@ def test_a_base_that_is_turned_against_its_object_and_joints_is_seen():
         np.testing.assert_allclose(found, [alarm, share, 3.0], rtol=1e-9)
 
 
-def test_levels_of_axes_are_those_of_the_cell_and_the_stage_in_which_the_measurements_were_made():
-    own, given = known()[0].monitored, inputs()
-    times, levels = np.array([[0.0, 1.6 * own.period]] * 3), np.ones((3, 2, 3, 2))
-    levels[0, 1, 0, 1], levels[1, 0, 0, 1] = 0.5, 0.25
-    block = DepartureMonitor(replace(own, axis_alarms=levels, alarm_times=times))
-    axes = given["nominal_axes"]
-    given["nominal_axes"] = [axes[0], axes[1] + 0.1, *axes[2:]]
-    simulator = Simulator(block, context_with(block, given))
-    context, alarm = simulator.get_mutable_context(), block.GetOutputPort("alarm")
-    simulator.AdvanceTo(2.5 * own.period)
-    assert list(alarm.Eval(context)[1:]) == pytest.approx([0.1, 6.0], rel=1e-6)
-    simulator.AdvanceTo(3.5 * own.period)
-    block.GetInputPort("current_cell").FixValue(context, [1.0, 3.5 * own.period])
-    for periods, expected in ((3.6, 0.2), (4.5, 0.2), (5.5, 0.4), (6.5, 0.4), (7.5, 0.1)):
-        simulator.AdvanceTo(periods * own.period)
-        assert alarm.Eval(context)[1] == pytest.approx(expected, rel=1e-6)
-
-
-def test_measurements_are_compared_with_the_nominal_state_of_their_stamp():
+def test_an_alarm_lasts_for_a_tenth_of_a_second():
     block, own, given = departure_monitor(), known()[0].monitored, inputs()
     simulator = Simulator(block, context_with(block, given))
     context, alarm = simulator.get_mutable_context(), block.GetOutputPort("alarm")
-    simulator.AdvanceTo(3.5 * own.period)
-    away = [given["nominal"][0] + 2.5 * own.levels[0], *given["nominal"][1:]]
-    block.GetInputPort("nominal").FixValue(context, away)
-    for periods, expected in ((3.6, 0.0), (4.5, 0.0), (5.5, 2.5)):  # measurements are two periods old
-        simulator.AdvanceTo(periods * own.period)
-        assert alarm.Eval(context)[1] == pytest.approx(expected, abs=1e-9)
-    block.GetInputPort("nominal").FixValue(context, given["nominal"])
-    simulator.AdvanceTo(7.5 * own.period)
-    assert list(alarm.Eval(context)[:2]) == pytest.approx(
-        [1.0, 0.0], abs=1e-9
-    )  # it was above its level just now
-    simulator.AdvanceTo(7.5 * own.period + 0.11)
+    away = given["nominal_motion"].copy()
+    away.reshape(3, 3, -1)[STAMPED, 0, 0] += 1.5 * own.levels[0]
+    block.GetInputPort("nominal_motion").FixValue(context, away)
+    assert list(alarm.Eval(context)[:2]) == pytest.approx([1.0, 1.5], rel=1e-6)
+    simulator.AdvanceTo(0.5 * own.period)
+    block.GetInputPort("nominal_motion").FixValue(context, given["nominal_motion"])
+    simulator.AdvanceTo(1.5 * own.period)
+    assert list(alarm.Eval(context)[:2]) == pytest.approx([1.0, 0.0], abs=1e-9)
+    simulator.AdvanceTo(0.11)
     assert alarm.Eval(context)[0] == 0.0
 
 
-def test_a_plan_with_a_budget_has_a_monitor_without_any_key_and_none_is_followed_without_levels():
-    scenario, plan = tubed_problem(NOISY)
-    assert hold_of(scenario, plan) == Hold()
-    assert hold_of(scenario, replace(plan, alarms=None)) is None
-    scenario, team = (
-        replace(scenario, deployment=Deployment(control_rate=200.0)),
-        build_station(scenario).team,
-    )
-    with pytest.raises(PlanError, match="no alarm levels"):
-        robot_knowledge(scenario, replace(plan, alarms=None), build_maps(plan), team)
+def test_a_plan_with_a_budget_has_a_monitor_without_any_key_and_needs_a_sampled_team():
+    scenario, plan = motion_under_budget()
+    assert known()[0].monitored is not None
+    continuous, team = replace(scenario, deployment=Deployment()), build_station(scenario).team
+    with pytest.raises(ScenarioError, match=r"deployment\.control_rate"):
+        robot_knowledge(continuous, plan, small_maps(), team)
+    free = replace(plan, departures=None, budget=None)
+    assert robot_knowledge(scenario, free, small_maps(), team)[1].monitored is None

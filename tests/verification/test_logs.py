@@ -7,13 +7,11 @@ import pytest
 
 from coop_drake.errors import RefusalError
 from coop_drake.plant import planning_problem, run_setup
-from coop_drake.scenario import ActuatorLimits, Deployment, Measurements, Messages
-from coop_drake.simulation import build_maps, simulate
+from coop_drake.simulation import simulate
 from coop_drake.verification.runs import Rows, verify_log
-from coop_drake.verification.runs.budget import check_nominal_reports
 from coop_drake.verification.runs.laws import check_handovers
+from tests.support.motions import motion_under_budget
 from tests.support.small_loop import small_maps, small_problem
-from tests.support.tubes import WITH_AXES, tubed_problem
 
 LOOSE = {"exact": False, "rigid": False, "mechanics": False, "one_clock": False, "alike": False}
 """A team that departs from the ideal one in every way that leaves a check aside."""
@@ -89,15 +87,8 @@ def test_an_altered_number_is_refused_unless_it_is_the_same_up_to_rounding(case)
 @pytest.fixture(scope="module")
 def budgeted():
     """A run of a noisy team under a plan with a budget, and all that it is checked against."""
-    scenario, plan = tubed_problem(WITH_AXES)
-    deployment = Deployment(
-        control_rate=plan.budget.control_rate,
-        measurements=Measurements(0.0003, 0.0002, 0.005, delay=plan.budget.delay),
-        actuators=ActuatorLimits(lag=plan.budget.lag),
-        messages=Messages(loss=0.2),
-    )
-    scenario = replace(scenario, deployment=deployment)
-    log = simulate(scenario, plan, build_maps(plan))
+    scenario, plan = motion_under_budget()
+    log = simulate(scenario, plan, small_maps())
     return log, (plan, planning_problem(scenario), run_setup(scenario))
 
 
@@ -136,18 +127,8 @@ def test_what_is_named_as_read_from_a_log(case, budgeted):
         assert name in said[1]
     log, against = budgeted
     said = verify_log(log, *against).not_proved
-    assert "energy_margin" not in said
+    assert "phases" not in said
     assert "ready_margins" in said
-
-
-def test_a_report_that_the_nominal_motions_do_not_give_is_refused(budgeted):
-    log, (plan, problem, _) = budgeted
-    reports = log.ready_margins.copy()
-    reports[len(reports) // 10] = 0.01
-    robots = [joint.robot for joint in problem.tree.joints]
-    assert len(check_nominal_reports(Rows(log, plan), robots)) == 2
-    with pytest.raises(RefusalError, match="the nominal motions give"):
-        check_nominal_reports(Rows(replace(log, ready_margins=reports), plan), robots)
 
 
 @pytest.mark.parametrize(

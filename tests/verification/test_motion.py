@@ -21,8 +21,8 @@ from coop_drake.answers.problem import TeamLimits
 from coop_drake.errors import PlanError, RefusalError
 from coop_drake.laws import ScheduledGains
 from coop_drake.planning.duration import timed
-from coop_drake.planning.motion import quickest_motion
-from coop_drake.planning.motion_limits import base_chains, base_places
+from coop_drake.planning.motion import pull_gains, quickest_motion
+from coop_drake.planning.motion_limits import base_chains, base_places, motion_limits
 from coop_drake.plant.problem import planning_problem
 from coop_drake.verification import verify_file, verify_plan
 from coop_drake.verification.gains import check_limits, check_speeds
@@ -121,7 +121,7 @@ def test_true_motions_are_accepted_and_samples_agree(either):
     assert [check.count > 0 for check in checks] == [True] * 5
     outside, share = sampled(plan, problem, plan.motion)
     assert outside == 0.0
-    assert 1.0 - share == pytest.approx(checks[3].tightest, abs=3e-3)
+    assert checks[3].tightest <= 1.0 - share <= checks[3].tightest + 5e-3
 
 
 # Alterations.
@@ -331,7 +331,7 @@ def test_every_limit_counts_as_the_problem_states_it(base, name):
 def test_a_motion_within_little_friction_is_slower_and_keeps_it(base):
     plan, problem = base
     slippery = with_limit(problem, "frictions", 0.06)
-    motion = quickest_motion(plan, slippery, GAINS.age)
+    motion = quickest_motion(plan, slippery, motion_limits(slippery.limits), pull_gains(GAINS.age))
     assert motion.duration > 1.05 * plan.motion.duration
     checks = check_motion(replace(plan, motion=motion), slippery, GAINS)
     assert 0.0 <= min(check.tightest for check in checks if check.unit.startswith("least share")) < 0.01
@@ -344,7 +344,8 @@ def test_limits_that_nobody_states_are_those_by_default(base, unknown):
     _, problem = base
     names = [name for name in LARGEST if name != "object_acceleration"]
     of = replace(problem.limits, **dict.fromkeys(names, unknown), object_acceleration=unknown[:1])
-    found = [(one.speed, one.acceleration, one.jerk) for one in _movers(replace(problem, limits=of))]
+    movers = _movers(replace(problem, limits=of))
+    found = [(one.speed, one.acceleration, one.jerk) for one in movers]
     by_friction = (np.inf, 0.5 * 9.81, np.inf)
     bases, joints = [(1.0, 1.0, 10.0), by_friction, (1.5, 2.0, np.inf)] * 2, [(1.0, 2.0, np.inf)] * 2
     assert found == [(np.inf, 1.5, np.inf), *bases, *joints]
@@ -475,15 +476,10 @@ def test_random_alterations_are_accepted_only_if_samples_keep_cells_and_limits(e
 # Plans, their files and what is said of them.
 
 
-def test_motions_of_ways_and_with_budgets_or_unknown_bases_are_refused(base):
+def test_motions_of_ways_and_with_unknown_bases_are_refused(base):
     plan, problem = base
     of_way = replace(plan, refused_by=("a limit",))
-    with_budget = replace(plan, budget="a budget")
-    for altered, asked in (
-        (of_way, problem),
-        (with_budget, problem),
-        (plan, replace(problem, limits=TeamLimits())),
-    ):
+    for altered, asked in ((of_way, problem), (plan, replace(problem, limits=TeamLimits()))):
         with pytest.raises(RefusalError) as error:
             check_motion(altered, asked, GAINS)
         assert error.value.where == "motion"

@@ -352,15 +352,11 @@ def check_reports(rows: Rows, problem: PlanningProblem) -> Check:
 def _leaving(rows: Rows, members: NDArray[np.bool_], cell: int) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Margins of object (m,) and axes (m, 1 + n) in a cell before the last, and what rounding changes."""
     log, plan = rows.log, rows.plan
-    rest, duration = plan.transitions[cell].gains.rest, plan.transitions[cell].gains.hand_over_time
-    if rest is None:
-        following, axes = plan.transitions[cell + 1].gains, rows.z[members, 2:]
-        energy = entry_energies(plan, cell + 1, axes, rows.rates[members, 2:])
-        settled = (following.energy_bound - energy) / np.maximum(energy, following.energy_bound)
-        of_axes = np.minimum(_inside_goal(rows, members, cell), settled)
-    else:
-        of_axes = 1.0 - rest_shares(plan, cell, rows.z[members, 2:], rows.rates[members, 2:])
-        duration = max(duration, rest.after)
+    duration = plan.transitions[cell].gains.hand_over_time
+    following, axes = plan.transitions[cell + 1].gains, rows.z[members, 2:]
+    energy = entry_energies(plan, cell + 1, axes, rows.rates[members, 2:])
+    settled = (following.energy_bound - energy) / np.maximum(energy, following.energy_bound)
+    of_axes = np.minimum(_inside_goal(rows, members, cell), settled)
     at_entry = np.zeros(int(members.sum()))
     margin = _energy_margin(rows, members, cell + 1, at_entry)
     floor = 0.5 * _governed(plan, cell + 1, at_entry)[0] * (0.5 * plan.transitions[cell].inradius) ** 2
@@ -370,27 +366,6 @@ def _leaving(rows: Rows, members: NDArray[np.bool_], cell: int) -> tuple[FloatAr
         of_object = np.minimum(of_object, np.minimum(time[members] / duration - 1.0, 1.0))
     change = 2.0 * STEP * np.abs(log.object_twist[members, :2]).sum(axis=1) / floor
     return of_object, of_axes, change
-
-
-def rest_shares(plan: Plan, cell: int, axes: FloatArray, rates: FloatArray) -> FloatArray:
-    """Departures from rest over those with which a cell may be left, per axis, the larger of both [-].
-
-    Where nominal motions are at rest, what axes may depart from them comes on top.
-
-    Args:
-        plan: A plan whose cells are left at rest.
-        cell: The cell that is left.
-        axes: (theta, q...), shape (..., 1 + n) [rad or m].
-        rates: Their rates, of the same shape.
-    """
-    transition = plan.transitions[cell]
-    assert transition.gains.rest is not None  # the caller asks for no other plan
-    away = np.abs(axes - 0.5 * (transition.goal_lower + transition.goal_upper))
-    reach, rate, stated = transition.gains.rest.reach, transition.gains.rest.rate, transition.tolerance
-    if stated is not None:
-        reach, rate = reach + stated.departure, rate + stated.rate_departure
-    shares: FloatArray = np.maximum(away / reach, np.abs(rates) / rate)
-    return shares
 
 
 def arriving(rows: Rows, members: NDArray[np.bool_], tolerance: float) -> tuple[FloatArray, FloatArray]:
@@ -465,7 +440,7 @@ def check_handovers(rows: Rows, *, exact: bool) -> list[Check]:
             raise RefusalError(where, f"at t = {log.times[members[-1]]:.6g} s: {text}")
     name = "cells were entered one by one, each when all robots were ready"
     shares = [float(_share(rows, k, i).max()) for k, i in enumerate(rows.entries, 1)]
-    used = "share of the energy, or of the departure from rest, that the axes may have when a cell is entered"
+    used = "share of the energy that the axes may have when a cell is entered"
     return [
         Check(name, len(rows.entries), arrays=("cell_index", "transition_start")),
         Check(used, len(shares), max(shares, default=None), "of the bound, largest"),
@@ -473,9 +448,7 @@ def check_handovers(rows: Rows, *, exact: bool) -> list[Check]:
 
 
 def _share(rows: Rows, cell: int, row: int) -> FloatArray:
-    """Energy of every axis, or departure from rest, over its bound when a cell is entered, shape (1 + n,)."""
-    if rows.plan.transitions[cell - 1].gains.rest is not None:
-        return rest_shares(rows.plan, cell - 1, rows.z[row, 2:], rows.rates[row, 2:])
+    """Energy of every axis over its bound when a cell is entered, shape (1 + n,)."""
     energies = entry_energies(rows.plan, cell, rows.z[row, 2:], rows.rates[row, 2:])
     share: FloatArray = energies / rows.plan.transitions[cell].gains.energy_bound
     return share

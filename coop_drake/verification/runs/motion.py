@@ -32,8 +32,10 @@ def check_followed(rows: Rows, problem: PlanningProblem, *, exact: bool) -> list
     motion, log = rows.plan.motion, rows.log
     assert motion is not None  # the caller asks for no other run
     checks = [check_phases(rows, motion, exact=exact), _check_cells(rows, motion, exact=exact)]
-    nominal, velocity, acceleration = _at(motion, log.phases[:, 0])
-    positions = np.stack([_at(motion, log.phases[:, k])[0][:, :2] for k in range(log.phases.shape[1])])
+    nominal, velocity, acceleration = motion_at_phases(motion, log.phases[:, 0])
+    positions = np.stack(
+        [motion_at_phases(motion, log.phases[:, k])[0][:, :2] for k in range(log.phases.shape[1])]
+    )
     largest = rows.require_same("governor_position", positions[0], SAME)
     rows.require_same("governor_spread", np.abs(positions - positions[0]).max(axis=(0, 2)), SAME)
     arrays = ("governor_position", "governor_spread")
@@ -91,7 +93,8 @@ def check_phases(rows: Rows, motion: Motion, *, exact: bool) -> Check:
     )
     parted = np.ptp(phase, axis=1)
     text = "of robots differ by {:.9g} s"
-    rows.require(parted <= (0.0 if exact else 2.0 * CLOCK_ERROR) + SAME, "phases", text, parted)
+    eps = CLOCK_ERROR if rows.plan.budget is None else rows.plan.budget.clock_error
+    rows.require(parted <= (0.0 if exact else 2.0 * eps) + SAME, "phases", text, parted)
     name = "phases are such as words allow, and those of all robots agree"
     return Check(name, phase.size, float(parted.max()), "s, largest difference", ("phases",))
 
@@ -129,7 +132,7 @@ def _check_cells(rows: Rows, motion: Motion, *, exact: bool) -> Check:
     )
 
 
-def _at(motion: Motion, phases: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+def motion_at_phases(motion: Motion, phases: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return the motion, its rate and its acceleration at phases, (T, 3 + n) each; it rests after its end."""
     spline = BSpline(motion.period * (np.arange(len(motion.points) + 4) - 3.0), motion.points, 3)
     within, (pace, rate) = np.clip(phases[:, PHASE], 0.0, motion.duration), phases[:, PACE:].T[..., None]

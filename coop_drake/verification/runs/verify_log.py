@@ -32,7 +32,7 @@ from coop_drake.progress import Progress
 from coop_drake.tree.arrays import FloatArray
 from coop_drake.verification.checks import Check, Verified
 from coop_drake.verification.runs import bodies
-from coop_drake.verification.runs.budget import check_budget_used, check_nominal_reports
+from coop_drake.verification.runs.budget import check_budget_used
 from coop_drake.verification.runs.laws import (
     check_cells,
     check_clock,
@@ -152,12 +152,8 @@ def verify_log(
     checks += bodies.check_clearances(rows, between, problem, progress)
     if not braked:
         checks += check_budget_used(rows)
-        robots = [joint.robot for joint in problem.tree.joints]
-        checks += check_nominal_reports(rows, robots) if setup.alike else []
     stayed = "" if braked else ", and the team stayed in cells and funnels"
     aside = _left_aside(setup, braked=braked)
-    if log.held.any() and plan.budget is not None and plan.budget.axes and not braked:
-        aside.append("how far the axes departed from their nominal motions, for the team was held")
     return Verified(
         "arrived",
         f"run of {log.times[-1]:.2f} s in {len(log.times)} rows",
