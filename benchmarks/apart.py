@@ -112,7 +112,8 @@ def stops_tasks() -> list[Task]:
 
 def _rows(team: str, _: Sequence[Row]) -> list[Row]:
     ideal = load_scenario(team)
-    scenario = replace(ideal, deployment=deployment_of({"preset": "mobile_base", "budget": "all"}))
+    rests, deployment = replace(ideal.planner, hand_over="rest"), deployment_of({"preset": "mobile_base"})
+    scenario = replace(ideal, planner=rests, deployment=deployment)
     answer = plan(scenario)
     if not isinstance(answer, Found):
         raise PlanError(f"{scenario.path}: no plan to stop: {answer.reason}")
@@ -156,7 +157,6 @@ def stopped(name: str, scenario: Scenario, plan: Plan, maps: Sequence[HarmonicMa
         "runs": (runs, ""),
         "arrived": (arrived, ""),
         "stops": (len(found), ""),
-        "certified": (sum(stop.certified for stop in found), ""),
         "goes_on_after": (max((stop.resumed or inf) - stop.since for stop in found), "s"),
         "clearance": (1e3 * nearest, "mm"),
     }

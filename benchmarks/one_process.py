@@ -88,7 +88,7 @@ class DirectExchange:
             self.messages += ((time, k, message) for message in said)
         self.messages += ((time, None, message) for message in told)
         if stopped and all(robot.state in MOVES for robot in self.robots):
-            self.membership.close_line(time, certified=not self._returns())
+            self.membership.close_line(time, returns=self._returns())
         return [effort for effort, _ in done]
 
     def _returns(self) -> bool:

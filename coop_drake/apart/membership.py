@@ -37,15 +37,15 @@ class Stop:
         since: When the line was opened [s].
         rested: When the team rested, None where it did not [s].
         resumed: When it went on, None where it did not [s].
-        certified: Whether it began its cell anew from a rest for which the plan holds; else it returned
-            slowly, on a way that no plan has proved free.
+        returned: Whether it then first went slowly to its cell, on a way that no plan has proved free, as
+            teams do that rest in every cell.
     """
 
     cause: str
     since: float
     rested: float | None = None
     resumed: float | None = None
-    certified: bool = False
+    returned: bool = False
 
 
 class Processes:
@@ -138,10 +138,10 @@ class Membership:
         elif self.timed_out():
             self.give_up()
 
-    def close_line(self, time: float, *, certified: bool) -> None:
+    def close_line(self, time: float, *, returns: bool) -> None:
         """All robots go on."""
-        self.stopped, self.stops[-1].resumed, self.stops[-1].certified = False, time, certified
-        how = "" if certified else ", and returns slowly to its cell on a way that no plan has proved free"
+        self.stopped, self.stops[-1].resumed, self.stops[-1].returned = False, time, returns
+        how = ", and returns slowly to its cell on a way that no plan has proved free" if returns else ""
         self._tell(f"the team goes on at t = {time:.6g} s{how}")
 
     def timed_out(self) -> bool:

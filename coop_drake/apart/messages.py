@@ -11,7 +11,7 @@ from typing import Annotated, Any, Literal, Union
 from msgspec import DecodeError, Meta, Struct
 from msgspec.msgpack import Decoder, Encoder
 
-PROTOCOL = 6
+PROTOCOL = 7
 """Version of the protocol; grows when a message of the same fields would mean something else."""
 
 WORLD, SUPERVISOR = 255, 254
@@ -279,15 +279,12 @@ class AtRest(Message, frozen=True):
 
     Attributes:
         sample: Number of the sample.
-        cells: Indices of the present cell and of its neighbours that it can begin anew from there with all
-            that the plan promises; none in a plan that promises nothing.
-        needed: For how many samples it goes slowly until a cell's law takes over, the most of these cells.
+        needed: For how many samples it goes slowly until the cell's law takes over.
         object_pose: Pose (x, y, angle) of the object's frame L in W as this robot measures it, the mean over
             the time in which it was seen to rest.
     """
 
     sample: Number
-    cells: Numbers
     needed: Number
     object_pose: Pose
 

@@ -28,7 +28,7 @@ STATES = (
     "waits at rest to begin its cell anew",
     "does not know the current cell",
     "rests where it cannot begin its cell anew",
-    "returns slowly to its cell, uncertified",
+    "returns slowly to its cell",
     "has measurements that are older than the plan allows, or stamps that cannot be",
 )
 """The same in words."""

@@ -109,8 +109,7 @@ class PassingRobot(RobotNode):
             stands = brakes or (rows[HOLD] == -inf and not self._goes_on)
             self.state, self.rest = nodes.STANDS if stands else nodes.FOLLOWS, self._stop()[1]
         else:
-            goes = nodes.FOLLOWS if self._monitored else nodes.RETURNS  # Without a budget nothing is proved.
-            self.state = goes if there else nodes.OUTSIDE if self._seen else nodes.STANDS
+            self.state = nodes.FOLLOWS if there else nodes.OUTSIDE if self._seen else nodes.STANDS
         return self._sampled.output("robot_effort"), [msg.Word(tuple(rows.tolist()))]
 
     def _stop(self) -> tuple[float, FloatArray]:

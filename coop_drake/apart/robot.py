@@ -167,7 +167,7 @@ class RobotNode:
         self.rest: FloatArray | None = None
         self._order: msg.Begin | None = None
         self._slow: SlowMotion | None = None
-        self._stays_until, self._doubted = 0, 0
+        self._doubted = 0
         self._stamps = StampCheck(self.period, knowledge.plan.budget, knowledge.measured_age)
         self._still = nodes.Stillness(self.period, nodes.LASTING)
         self._timeout = self._samples_of(nodes.REPORT_TIMEOUT)
@@ -307,22 +307,15 @@ class RobotNode:
         middle = 0.5 * (table[:, GOAL_LOWER] + table[:, GOAL_UPPER])
         ends = np.stack([axes, middle]), np.stack([pose[:2], target])
         self._slow = SlowMotion(order.sample, order.slow, *ends)
-        self.state, self._stays_until = nodes.RETURNS, order.sample + order.slow
+        self.state = nodes.RETURNS
         self._sampled.at(time, self._inputs(measured))
         self._deployed.begin(self._sampled.context, order.cell, pose, joints)
         self._said, self._reported, self._told_rest = msg.Ready(order.cell, False), inf, -inf
 
-    def _way(self, cell: int, axes: FloatArray, position: FloatArray) -> int:
-        """Return for how many samples the robot goes slowly from a rest."""
-        table = self._tables[cell]
-        way = np.abs(axes - 0.5 * (table[:, GOAL_LOWER] + table[:, GOAL_UPPER])).max()
-        way = max(float(way), float(np.hypot(*(self._inside(cell, position) - position))))
-        return actuators.slow_samples(way, self.period, 1.0)
-
-    def _inside(self, cell: int, position: FloatArray, room: float = 0.0) -> FloatArray:
+    def _inside(self, cell: int, position: FloatArray) -> FloatArray:
         """Return the point of a governed region, less a strip, that is nearest to a position [m]."""
         governed = self._plan.governed(cell)
-        if self._knowledge.cells[cell].clearance(position) >= room:
+        if self._knowledge.cells[cell].clearance(position) >= 0.0:
             return position
         region = next((part for part in (governed.buffer(-ROOM), governed) if not part.is_empty), governed)
         nearest = nearest_points(region, Point(position))[0]
@@ -348,8 +341,9 @@ class RobotNode:
         if self._number - self._told_rest < whole_periods(nodes.AGAIN, self.period):
             return []
         self._told_rest = self._number
-        needed = self._way(self.place.cell, axes, position)
-        return [msg.AtRest(self._number, (), needed, tuple(float(part) for part in mean[-3:]))]
+        way = np.abs(axes - 0.5 * (table[:, GOAL_LOWER] + table[:, GOAL_UPPER])).max()
+        needed = actuators.slow_samples(max(float(way), back), self.period)
+        return [msg.AtRest(self._number, needed, tuple(float(part) for part in mean[-3:]))]
 
     def _has_come(self, slow: SlowMotion, time: float) -> bool:
         """Whether the slow way is over: from now on the cell's law acts, with funnels that are closed."""
@@ -391,8 +385,7 @@ class RobotNode:
         said: Said = []
         index, margin = self._sampled.output("ready")
         cell = int(self._cell[0])
-        stays = self._number < self._stays_until or self._doubted > 0
-        ready = index == cell and margin >= 0.0 and not stays
+        ready = index == cell and margin >= 0.0 and self._doubted == 0
         again = self._said.cell == cell and self._number - self._reported >= self._timeout
         if again or ready != (self._said == msg.Ready(cell, True)):
             self._said, self._reported = msg.Ready(cell, bool(ready)), self._number

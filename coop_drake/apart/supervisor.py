@@ -135,10 +135,7 @@ class SupervisorNode:
         return said
 
     def _gathered(self, number: int) -> list[msg.Switch | msg.Hold | msg.Begin]:
-        """Return the order to begin, once all robots have said that they rest since the drives brake.
-
-        The cell is one that holds all robots, the present one where it does.
-        """
+        """Return the order to begin, once all robots have said that they rest since the drives brake."""
         robots = range(self._robots)
         resting = all(k in self._resting and self._resting[k].sample > self._since for k in robots)
         if self._order is not None or not resting or not self.knows:
@@ -150,9 +147,7 @@ class SupervisorNode:
         pose = tuple(poses.mean(axis=0).tolist())
         # The mean of all robots' poses is another one than each of them has computed its way for.
         slow = max(one.needed for one in told) + SPARE
-        common = set.intersection(*({*one.cells} for one in told)) & {*range(self._cells)}
-        cell = min(common, key=lambda c: (abs(c - self._place.cell), c), default=self._place.cell)
-        self._order = msg.Begin(cell, sample, slow, pose)
+        self._order = msg.Begin(self._place.cell, sample, slow, pose)
         return [self._order]
 
     def hear(self, robot: int, messages: Iterable[Any]) -> None:

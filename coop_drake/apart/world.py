@@ -246,7 +246,7 @@ class SampleExchange:
         efforts = [self._last.get((k, messages.Effort)) for k in self._everyone[:-1]]
         begun = all(e and e.number == self.sample and e.state in MOVES for e in efforts)
         if self.membership.stopped and begun and not self.missing:
-            self.membership.close_line(time, certified=RETURNS not in self._states.values())
+            self.membership.close_line(time, returns=RETURNS in self._states.values())
 
     def _effort(self, robot: int, measured: FloatArray) -> FloatArray:
         """Return what the drives of a robot do."""

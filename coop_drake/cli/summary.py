@@ -121,9 +121,8 @@ def _stop_line(stop: Mapping[str, Any]) -> str:
         line += f"; the team rested {stop['rested'] - stop['since']:.2f} s later"
     if stop["resumed"] is not None:
         line += f", and went on at t = {stop['resumed']:.2f} s"
-        line += (
-            "" if stop["certified"] else ", first slowly to its cell on a way that no plan has proved free"
-        )
+        if stop["returned"]:
+            line += ", first slowly to its cell on a way that no plan has proved free"
     return line
 
 

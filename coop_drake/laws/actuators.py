@@ -141,8 +141,7 @@ def braking_effort(state: FloatArray, brake: Brake, rest: FloatArray | None = No
 # Meanwhile the object's position rests, or returns to its cell in the same way where it is outside. Then
 # the cell's law takes over: its funnels are closed about the axes, and p_G goes to the target.
 #
-# A cell is convex in its axes: from a rest inside the slices the way lies inside. What the plan states
-# about such rests is in ``answers/budget.py``.
+# A cell is convex in its axes: from a rest inside the slices the way lies inside.
 
 RATE = 0.4
 """Largest rate of an axis on the way, and largest speed of the object [rad/s or m/s]: a fifth to a tenth of
@@ -168,16 +167,14 @@ RAMPED = 6.0
 """mu t from which on the gain k1 counts as ramped in [-], as in the plan's budget."""
 
 
-def slow_samples(distance: float, period: float, share: float = 1.0) -> int:
+def slow_samples(distance: float, period: float) -> int:
     """Return how many periods a way takes [-].
 
     Args:
         distance: Largest distance of an axis, or of the object [rad or m].
         period: T [s].
-        share: Share of rate and acceleration that the plan allows [-].
     """
-    used = USED * share
-    time = max(1.875 * distance / (used * RATE), sqrt(5.774 * distance / (used * ACCELERATION)))
+    time = max(1.875 * distance / (USED * RATE), sqrt(5.774 * distance / (USED * ACCELERATION)))
     return ceil(time / period) + 1
 
 

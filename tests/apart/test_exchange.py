@@ -181,9 +181,9 @@ def test_the_drives_brake_once_a_robot_is_missing_for_longer_than_is_tolerated()
     assert book.told == ["robot 1 has not answered since t = 0.39 s"]
     book.membership.back(1)
     book.membership.see(0.9, {0: STANDS, 1: STANDS}, rests=True)
-    book.membership.close_line(1.1, certified=True)
+    book.membership.close_line(1.1, returns=False)
     assert book.membership.facts()["stops"] == [
-        {"cause": "robot 1", "since": 0.42, "rested": 0.9, "resumed": 1.1, "certified": True}
+        {"cause": "robot 1", "since": 0.42, "rested": 0.9, "resumed": 1.1, "returned": False}
     ]
     assert book.told[1:] == ["robot 1 is there again", "the team goes on at t = 1.1 s"]
 

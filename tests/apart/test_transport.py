@@ -253,8 +253,8 @@ def test_the_first_messages_are_those_of_the_session_which_begins_once(team):
         (msg.Hello(msg.PROTOCOL, 0, "scenario", "another"), "it has another plan", "SESSION"),
         (msg.Hello(msg.PROTOCOL, 7, "scenario", "plan"), "it knows no process of this name", "SENDER"),
         (
-            {"type": "Hello", "protocol": 7, "name": "arm"},
-            f"it speaks protocol {msg.PROTOCOL}, not 7",
+            {"type": "Hello", "protocol": 8, "name": "arm"},
+            f"it speaks protocol {msg.PROTOCOL}, not 8",
             "VERSION",
         ),
         (msg.Hello(4, 0, "scenario", "plan"), f"it speaks protocol {msg.PROTOCOL}, not 4", "VERSION"),

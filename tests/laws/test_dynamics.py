@@ -47,18 +47,17 @@ def test_the_base_of_every_robot_turns_with_the_object_and_against_its_joints():
 # Brakes of the drives, and the slow way on which a cell is begun anew.
 
 
-@pytest.mark.parametrize("share", [1.0, 0.25])
 @pytest.mark.parametrize("distance", [1e-4, 0.05, 0.4, 3.0])
-def test_the_way_keeps_to_its_bounds_and_ends_at_rest(distance, share):
+def test_the_way_keeps_to_its_bounds_and_ends_at_rest(distance):
     T = 0.005
-    samples = actuators.slow_samples(distance, T, share)
+    samples = actuators.slow_samples(distance, T)
     ends = np.array([[1.0, 0.2], [1.0 - distance, 0.2]])
     motions = [actuators.slow_motion(ends, k * T, samples * T) for k in range(samples + 1)]
     x, v, a = (np.array(part) for part in zip(*motions, strict=True))
     assert (x[0], x[-1]) == (pytest.approx(ends[0]), pytest.approx(ends[1]))
     assert np.abs([v[0], v[-1], a[0], a[-1]]).max() < 1e-12
-    assert np.abs(v).max() <= actuators.USED * share * actuators.RATE
-    assert np.abs(a).max() <= actuators.USED * share * actuators.ACCELERATION
+    assert np.abs(v).max() <= actuators.USED * actuators.RATE
+    assert np.abs(a).max() <= actuators.USED * actuators.ACCELERATION
     assert np.gradient(x[:, 0], T)[1:-1] == pytest.approx(
         v[1:-1, 0], abs=2e-3 * actuators.USED * actuators.RATE
     )
