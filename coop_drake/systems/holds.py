@@ -9,7 +9,6 @@ from pydrake.systems.framework import BasicVector, Context, DiscreteValues, Even
 
 from coop_drake.laws.axis_table import ENERGY_BOUND, track_row
 from coop_drake.laws.ppc import SETTLING_TIME, lagging_clock
-from coop_drake.laws.readiness import ASKS
 from coop_drake.systems.block import CLOCK_SIZE, CURRENT_CELL_SIZE, REQUEST_SIZE, Block, index_of
 from coop_drake.systems.ppc import AxisLaw
 
@@ -130,7 +129,7 @@ class HoldReceiver(Block):
 # The supervisor that holds the team: when it is told to, a robot asks for it, or a robot is not heard.
 
 TOLD, ASKED, SILENT, BRAKED = 1.0, 2.0, 3.0, 4.0
-"""Causes of a hold."""
+"""Causes of a hold, and of drives that brake: an order; a robot asks, is not heard, or lets them brake."""
 
 
 class HoldSupervisor(Block):
@@ -145,8 +144,7 @@ class HoldSupervisor(Block):
     output  ``paused``            1     1 while the funnels' clock does not run as usual, else 0: the
                                         cell must not be left [-]
     output  ``causes``            1 + N first the order (0, or 1 where the team is told to hold), then each
-                                        robot: 0 for no cause, 2 where it asks, 3 where it is not heard, 4
-                                        where it says that the drives shall brake [-]
+                                        robot: 0 for no cause, 2 where it asks, 3 where it is not heard [-]
     ======= ===================== ===== ================================================================
 
     State: one discrete group, updated at the start of every step, or every ``period``: the time at which the
@@ -184,7 +182,7 @@ class HoldSupervisor(Block):
             if number != heard[k, 0]:
                 heard[k] = number, now
             silent = SILENT if now - heard[k, 1] > self._silence else 0.0
-            causes[1 + k] = BRAKED if asks > ASKS else ASKED if asks > 0.0 else silent
+            causes[1 + k] = ASKED if asks > 0.0 else silent
         if held and not causes.any():
             state[0] = now
         state[-1] += 1.0

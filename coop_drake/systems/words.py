@@ -230,7 +230,8 @@ class WordPlanner(_Speaker):
     input   ``order``   1            1 where the team is told to hold, else 0 [-]; may be left out
     output  ``said``    9 m          the last m rows that it sent
     output  ``arrived`` 1            1 when all robots rest at the goal, else 0 [-]
-    output  ``causes``  1 + N        why the team rests or its drives brake, see ``HoldSupervisor``
+    output  ``causes``  1 + N        why the team rests, as of ``HoldSupervisor``; of a robot also 4 where it
+                                     lets the drives brake [-]
     ======= =========== ============ ====================================================================
 
     State: one discrete group, updated every period: all words that it heard, the rows that it sent, what it
