@@ -182,7 +182,7 @@ class Messages:
 
     Attributes:
         loss: Probability that a report is lost [-].
-        repeat: Probability that a report arrives twice, one delay apart [-].
+        repeat: Probability that a report arrives twice, one delay apart, which changes nothing for words [-].
         delay: Time that a report travels [s].
     """
 

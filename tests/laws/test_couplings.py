@@ -9,7 +9,7 @@ from pydrake.systems.framework import DiagramBuilder
 from scipy.linalg import expm
 
 from coop_drake.laws import Funnel, ScheduledGains, transition_gains
-from coop_drake.laws.axis_table import axis_table, bounds_of, slope_bounds, track_row
+from coop_drake.laws.axis_table import axis_table, bounds_of, track_row
 from coop_drake.laws.couplings import disagreement_coupling, rate_terms
 from coop_drake.plant import build_team_plant, turning_coupling
 from coop_drake.plant.component_tree import read_component_tree
@@ -35,8 +35,10 @@ def narrow_axis(age):
 
 def sampled_radius(row, s, delay, mass_error):
     """Spectral radius of the linearised loop: samples, delay, hold, lag; (x, x', x'' and older samples)."""
-    position = WIDTH / (1.0 + np.exp(-s))
-    stiffness, _, damping, _ = -np.array(slope_bounds(row, LONG_AFTER, position, 0.0, 0.0))
+    x, h = WIDTH / (1.0 + np.exp(-s)), 1e-6 * WIDTH
+    ends = np.array([(x + h, 0.0), (x - h, 0.0), (x, h), (x, -h)])
+    laws = [track_row(row, LONG_AFTER, *end)[0] for end in ends]
+    stiffness, damping = (laws[1] - laws[0]) / (2.0 * h), (laws[3] - laws[2]) / (2.0 * h)
     old = round(delay / PERIOD)
     plant = np.zeros((4, 4))
     plant[0, 1] = plant[1, 2] = 1.0
@@ -57,7 +59,7 @@ def test_a_late_joint_is_stable_up_to_a_sixth_of_its_width_before_a_bound(delay,
     radii = [sampled_radius(row, s, delay, mass_error) for s in np.linspace(0.0, 1.6, 9)]
     assert max(radii) < 1.0
     assert sampled_radius(row, 1.8, delay, mass_error) > 1.0
-    assert sampled_radius(row, np.log(49.0) - 1e-6, delay, mass_error) > 1.3
+    assert sampled_radius(row, np.log(49.0) - 1e-3, delay, mass_error) > 1.3
     pull = -track_row(row, LONG_AFTER, WIDTH / (1.0 + np.exp(-1.6)), 0.0)[0]
     assert pull == pytest.approx(0.31 * gains.rate_gain**2 * WIDTH, rel=0.02)
 
