@@ -322,12 +322,11 @@ def _reason(transport: CompiledTransport, figures: FloatArray, axes: tuple[str, 
         int(figures[watching.CELL]),
         figures[watching.VALUE],
     )
-    asks = {watching.HELD: "asks for a hold", watching.BRAKED: "lets the drives brake"}
-    if (how := asks.get(int(figures[watching.ENDED]))) is not None:
+    if figures[watching.ENDED] == watching.BRAKED:
         k = int(figures[watching.ROBOT])
         robot, (first, last) = transport.robot_names[k], transport.team.first[2, k : k + 2].tolist()
         what = departing_name(int(figures[watching.PLACE]), axes[1 + first : 1 + last])
-        said = f"{robot} {how}: {what} departs {value:.3g} times as far as its level allows"
+        said = f"{robot} lets the drives brake: {what} departs {value:.3g} times as far as its level allows"
         return f"at t = {time:.6g} s in cell {cell}: {said}, as {robot} measures it"
     axis = axes[int(figures[watching.PLACE])]
     text = {

@@ -80,9 +80,8 @@ way, and when it moved on along its motion the last time, or a person held it.""
     OUT_OF_REGION,
     AT_WALL,
     AT_BODY,
-    HELD,
     BRAKED,
-) = range(12)
+) = range(11)
 """How a run may have ended."""
 
 
@@ -119,13 +118,12 @@ def watch(
         figures: Receives the figures of the run.
     """
     z, entered, before = room.z, memory.current[sample % memory.current.shape[0]], room.before
-    now, cell, robots, asked, most = sample * departures.times[0], int(entered[0]), team.yaws.size, False, 0
-    figures[SAMPLES], figures[CELL], used = sample, cell, -inf
+    now, cell, robots, braking, most = sample * departures.times[0], int(entered[0]), team.yaws.size, False, 0
+    figures[SAMPLES], figures[CELL] = sample, cell
     for i in range(z.size):
         z[i] = memory.state[team.places[0, i]]
 
-    # Distances of axes to funnels and slices. What one uses of the budget is the least distance to its
-    # funnel's bounds that the budget states, over the one that it keeps.
+    # Distances of axes to funnels and slices.
     passes = nominal.points.size > 0
     for i in range(z.size - 2):
         k = plant.axis_rows[1, i]
@@ -203,13 +201,22 @@ def watch(
                 figures[SPREAD] = max(figures[SPREAD], apart)
         figures[HOLDS] = memory.supervised[2]
         if nominal.stated.size:
-            used = max(used, _share_used(team, nominal, memory, room))
-    if used >= 0.0 and not figures[SHARE] > used:
-        figures[SHARE] = used
+            for i in range(z.size):
+                place = rate = 0.0
+                for k in range(robots):
+                    place += room.nominal[k, 0, i] / robots
+                    rate += room.nominal[k, 1, i] / robots
+                room.off[0, i], room.off[1, i] = z[i] - place, memory.state[team.places[1, i]] - rate
+            used = 0.0
+            for row in range(2):
+                used = max(used, hypot(room.off[row, 0], room.off[row, 1]) / nominal.stated[row, 0])
+                for i in range(2, z.size):
+                    used = max(used, abs(room.off[row, i]) / nominal.stated[row, i - 1])
+            if not figures[SHARE] > used:
+                figures[SHARE] = used
 
     # Efforts of all robots, the object's rotation, and what the robots' monitors say: the run ends where one
-    # lets the drives brake, or where one asks for a hold and the team cannot be held; the robot is named that
-    # departs most.
+    # lets the drives brake; the robot is named that departs most.
     for k in range(robots):
         own = 3 * k + team.first[2, k]
         x, y = memory.efforts[1, own], memory.efforts[1, own + 1]
@@ -225,7 +232,7 @@ def watch(
             figures[EFFORT] = max(figures[EFFORT], abs(memory.efforts[1, own + 3 + i]))
         if nominal.levels.size and not figures[ALARM] > memory.alarms[k, 1]:
             figures[ALARM] = memory.alarms[k, 1]
-        asked = asked or (memory.words[robots, k, HOLD] == -inf if passes else memory.alarms[k, 0] > 0.0)
+        braking = braking or (passes and memory.words[robots, k, HOLD] == -inf)
         if memory.alarms[k, 1] > memory.alarms[most, 1]:
             most = k
     rate = memory.state[team.places[1, 2]]
@@ -233,9 +240,9 @@ def watch(
     if turn > figures[TURN]:
         figures[TURN] = turn
     before[-1] = rate
-    if asked and figures[ENDED] == RUNS:
+    if braking and figures[ENDED] == RUNS:
         figures[ROBOT] = most
-        end(figures, BRAKED if passes else HELD, memory.alarms[most, 1], int(memory.alarms[most, 2]))
+        end(figures, BRAKED, memory.alarms[most, 1], int(memory.alarms[most, 2]))
 
     time = now - entered[1]
     if passes:
@@ -257,24 +264,6 @@ def watch(
         end(figures, STALLED, time)
     elif now >= departures.times[1]:
         end(figures, LATE, time)
-
-
-@compiled(inlined=True, borrows=True)
-def _share_used(team: LoopTeam, nominal: LoopNominal, memory: LoopMemory, room: WatchRoom) -> float:
-    """Return the largest departure from the mean of the robots' motions over what the plan states [-]."""
-    z, robots = room.z, team.yaws.size
-    for i in range(z.size):
-        place = rate = 0.0
-        for k in range(robots):
-            place += room.nominal[k, 0, i] / robots
-            rate += room.nominal[k, 1, i] / robots
-        room.off[0, i], room.off[1, i] = z[i] - place, memory.state[team.places[1, i]] - rate
-    used = 0.0
-    for row in range(2):
-        used = max(used, hypot(room.off[row, 0], room.off[row, 1]) / nominal.stated[row, 0])
-        for i in range(2, z.size):
-            used = max(used, abs(room.off[row, i]) / nominal.stated[row, i - 1])
-    return used
 
 
 @compiled(borrows=True)

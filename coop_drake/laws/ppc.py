@@ -399,26 +399,12 @@ def track_axis(
     Returns:
         x'' [rad/s^2 or m/s^2] and V [rad^2/s^2 or m^2/s^2].
     """
-    w, saturation = bounds[1] - bounds[0], gains[4]
-    near, far = saturation * w, (1.0 - saturation) * w
-    dl = min(max(position - bounds[0], near), far)
-    du = min(max(bounds[1] - position, near), far)
-    return track_distances(dl, du, np.log(dl / du), rate, bounds, gains)
-
-
-@compiled(borrows=True)
-def track_distances(
-    dl: float,
-    du: float,
-    s: float,
-    rate: float,
-    bounds: tuple[float, float, float, float, float, float],
-    gains: tuple[float, float, float, float, float],
-) -> tuple[float, float]:
-    """Return ``track_axis`` for saturated distances dl and du [rad or m] and s = ln(dl / du)."""
     lower, upper, lower_rate, upper_rate, lower_acceleration, upper_acceleration = bounds
-    log_gain, k1, k1_dot, k2, _ = gains
+    log_gain, k1, k1_dot, k2, saturation = gains
     w, w_dot = upper - lower, upper_rate - lower_rate
+    near, far = saturation * w, (1.0 - saturation) * w
+    dl, du = min(max(position - lower, near), far), min(max(upper - position, near), far)
+    s = np.log(dl / du)
     dl_dot, du_dot = rate - lower_rate, upper_rate - rate
     s_dot = dl_dot / dl - du_dot / du
     a = w / (dl * du)

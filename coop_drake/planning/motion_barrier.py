@@ -296,17 +296,6 @@ def _add_jerk(
 
 
 @compiled(borrows=True)
-def _add_line(
-    weight: float, left: float, shares: tuple[float, float, float], place: int, D: int, slopes: Slopes
-) -> None:
-    """Add the derivatives of -weight log(left), left being linear in three control points' times."""
-    for i in range(3):
-        slopes.point[place + i * D] -= weight / left * shares[i]
-        for k in range(i + 1):
-            slopes.band[place + k * D, (i - k) * D] += weight / (left * left) * shares[i] * shares[k]
-
-
-@compiled(borrows=True)
 def add_times(
     points: FloatArray, weight: float, shortest: FloatArray, evenness: float, slopes: Slopes, derive: bool
 ) -> float:
@@ -336,8 +325,11 @@ def add_times(
             if not left > 0.0:
                 return np.inf
             total -= weight * log(left)
-            if derive:
-                _add_line(weight, left, shares, (j - 1) * D + D - 1, D, slopes)
+            for i in range(3 if derive else 0):
+                slopes.point[(j + i) * D - 1] -= weight / left * shares[i]
+                for k in range(i + 1):
+                    bend = weight / (left * left) * shares[i] * shares[k]
+                    slopes.band[(j + k) * D - 1, (i - k) * D] += bend
     return total
 
 

@@ -112,18 +112,6 @@ def _largest(rows: FloatArray) -> FloatArray:
 
 
 @compiled
-def lag_factors(period: float, lag: float) -> tuple[float, float, float]:
-    """Return what a command u held over a period leaves of a - u: in a [-], in x' [s] and in x [s^2].
-
-    The acceleration a follows the command with the time constant ``lag``.
-    """
-    if lag == 0.0:
-        return 0.0, 0.0, 0.0
-    left = exp(-period / lag)
-    return left, lag * (1.0 - left), lag * period - lag * lag * (1.0 - left)
-
-
-@compiled
 def loop_sums(
     gains: tuple[float, float], times: tuple[float, float, float], factor: float, delay: int, samples: int
 ) -> FloatArray:
@@ -142,7 +130,9 @@ def loop_sums(
         samples: Largest number of samples.
     """
     (stiffness, damping), (T, lag, ahead) = gains, times
-    left, in_v, in_x = lag_factors(T, lag)
+    # The acceleration a follows a command u with the lag: what a period leaves of a - u in a, x' and x.
+    left = exp(-T / lag) if lag > 0.0 else 0.0
+    in_v, in_x = lag * (1.0 - left), lag * T - lag * lag * (1.0 - left)
     # The runs: a unit of command, of e and of e'. A ring holds e and e' of the last m samples.
     e, v, s, sums = np.zeros(3), np.zeros(3), np.zeros(3), np.zeros((5, 3))
     past, q, quiet = np.zeros((delay + 1, 2, 3)), np.zeros(3), 0

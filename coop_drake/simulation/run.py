@@ -400,21 +400,16 @@ class Watch:
     def _beyond_holding(self, sample: Sample) -> str | None:
         """Return why a robot's monitor ends the run, None where it does not.
 
-        The drives brake where a departure grows on. A loop without a supervisor cannot be held. A team
-        that is held for long by its own monitors will not go on.
+        The drives brake where a departure grows on. A team that is held for long by its own monitors will
+        not go on.
         """
-        if not sample.causes.size:
-            asking = np.flatnonzero(sample.alarms[:, 0]).tolist()
-        else:
-            asking = [k for k, cause in enumerate(sample.causes[1:]) if cause == ASKED]
+        asking = [k for k, cause in enumerate(sample.causes[1:]) if cause == ASKED]
         braking = [k for k, cause in enumerate(sample.causes[1:]) if cause == BRAKED]
         since = sample.time if self._asked_since is None else self._asked_since
         self._asked_since = since if asking else None
         team, plan = self._loop.team, self._loop.plan
         if braking:
             return f"{_names(team, braking)} lets the drives brake{_departing(team, plan, sample)}"
-        if asking and not sample.causes.size:
-            return f"{_names(team, asking)} asks for a hold{_departing(team, plan, sample)}"
         if asking and sample.time - since > PATIENCE_ALLOWANCE:
             long = f"has asked for a hold since t = {since:.6g} s"
             return f"{_names(team, asking)} {long}{_departing(team, plan, sample)}"

@@ -404,19 +404,6 @@ def is_free_placed(
     return team_clearance(team, grid, poses, 0.0, ALL) >= 0.0 and bodies_apart(team, poses, gap, ALL)
 
 
-@compiled
-def first_collision(team: TeamArrays, grid: ObstacleGrid, path: FloatArray, gap: float) -> int:
-    """Index of the first configuration of a path, shape (m, 3 + n), that is not free; m if all of them are.
-
-    The other arguments are those of ``is_free``.
-    """
-    poses = np.empty((len(team.links), 5))
-    for k in range(len(path)):
-        if not is_free_placed(team, grid, path[k], gap, poses):
-            return k
-    return len(path)
-
-
 @compiled(borrows=True)
 def segment_is_free(
     team: TeamArrays,

@@ -16,7 +16,7 @@ from coop_drake.geometry.sweeps import following
 from coop_drake.jit import compiled
 from coop_drake.planning.questions import nearby
 from coop_drake.planning.sampling.band import clearances, improved
-from coop_drake.planning.sampling.collision import densified, first_collision, grid_for_team, is_free
+from coop_drake.planning.sampling.collision import densified, grid_for_team, is_free
 from coop_drake.tree.arrays import FloatArray, IntArray
 from coop_drake.tree.component_tree import TeamArrays, configuration_scale, moved, place_into
 
@@ -363,15 +363,11 @@ def amount_needed(eased: Eased, path: FloatArray, most: float) -> tuple[float, i
     lower, upper, worst = 0.0, most, 0
     for _ in range(HALVINGS):
         middle = 0.5 * (lower + upper)
-        question = eased(middle)
-        within = _within_limits(question, path)
-        count = len(path) if within.all() else int(np.argmin(within))
-        team = question.tree.arrays
-        blocked = first_collision(team, grid_for_team(question.workspace, team), path[:count], 0.0)
-        if blocked < len(path):
-            lower, worst = middle, blocked
-        else:
+        free = are_free(eased(middle), path)
+        if free.all():
             upper = middle
+        else:
+            lower, worst = middle, int(np.argmin(free))
     return upper, worst
 
 
