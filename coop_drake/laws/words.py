@@ -505,7 +505,9 @@ def supervisor_step(schedule: Schedule, clock: float, wanted: bool, words: Float
             i = next_brake(schedule, ahead)
             named = schedule.brakes[i] if i < cells else inf
             own[HOLD] = min(own[HOLD], named if w > 0.0 else ahead)
-        return (WAITS, behind) if resting > 0 else (GOES, -1)
+        # Robots end the motion one after the other, by their clocks: nobody waits there for who is heard.
+        ends = last >= schedule.ends[-1] and words[behind, STAMP] >= clock - window
+        return (WAITS, behind) if resting > 0 and not ends else (GOES, -1)
     if unfit >= 0:
         return DEPARTS, unfit
     if first >= schedule.ends[-1]:

@@ -313,6 +313,21 @@ def test_a_team_has_arrived_when_all_measure_that_they_are_at_the_goal():
     assert team.words[0, 0, w.EPOCH] == 1.0
 
 
+@pytest.mark.parametrize("heard", [True, False])
+def test_the_supervisor_waits_at_the_end_for_nobody_whom_it_hears(heard):
+    """A robot whose clock is behind ends the motion in a later sample than the others."""
+    team, seen, parted = Team(even_schedule(3), [0.0] * 3), set(), False
+    team.clocks[:2] = 1.0, -1.0
+    team.until(lambda team: team.time > 1.0 and team.phases[0] > team.schedule.ends[-1] - 0.01)
+    team.closed = set() if heard else {(1, 3)}
+    for _ in range(40):
+        team.step()
+        seen.add(team.code)
+        parted = parted or {w.RUN, w.REST} <= {*team.kinds}
+    assert parted
+    assert seen == {(w.GOES, -1), (w.ARRIVED, -1) if heard else (w.WAITS, 1)}
+
+
 def test_a_stop_stands_in_the_motion_as_soon_as_it_is_less_than_the_window_away():
     """So that times ahead of a sample have their phase, and the pace does not jump."""
     schedule = even_schedule(6)
