@@ -59,7 +59,6 @@ from coop_drake.planning.motion_barrier import (
     add_times,
     barrier,
     lay_planes,
-    newton_step,
 )
 from coop_drake.planning.motion_limits import (
     Chains,
@@ -67,6 +66,7 @@ from coop_drake.planning.motion_limits import (
     team_chains,
     times_at_limits,
 )
+from coop_drake.planning.motion_step import newton_step
 from coop_drake.tree.arrays import FloatArray, IntArray
 
 SPAN_TIME = 0.3

@@ -11,8 +11,9 @@ from coop_drake.answers.motion import WAITING
 from coop_drake.laws import ScheduledGains
 from coop_drake.planning.duration import plan_time, timed
 from coop_drake.planning.motion import BRAKE_RAMP
-from coop_drake.planning.motion_barrier import Slopes, newton_step
+from coop_drake.planning.motion_barrier import Slopes
 from coop_drake.planning.motion_limits import base_chains, base_places, follow, motion_limits
+from coop_drake.planning.motion_step import newton_step
 from coop_drake.planning.transitions import share_speeds
 from coop_drake.tree.arrays import FloatArray
 from tests.support.motions import planned_motion
