@@ -9,7 +9,6 @@ from time import monotonic
 from typing import Any
 
 import numpy as np
-from pydrake.systems.framework import Context
 from shapely import Point
 from shapely.ops import nearest_points
 
@@ -235,10 +234,8 @@ class RobotNode:
         self._number = period_of(time, self.period) if sample is None else sample
         doubts = stamps is not None and self._stamps.doubts(self._number, time, stamps)
         self._doubted = self._doubted + 1 if doubts else 0
-        held = self._held or self._plan.motion is not None
-        longest = whole_periods(LONGEST_DOUBT, self.period) if held else 0
-        if self._doubted > longest and self.place.known:
-            self.state, self._slow, self._order = nodes.LATE, None, None
+        if self._doubted > whole_periods(LONGEST_DOUBT, self.period) and self.place.known:
+            self.state = nodes.LATE
             return np.zeros(3 + self._joints), []
         measured = self._unwrapped(measured)
         if self.place.known and np.isfinite(measured).all():
@@ -360,7 +357,7 @@ class RobotNode:
         self._cell, held = np.array([self.place.cell, time]), self._hold_message
         released = {"hold_message": held * [0, 1]} if self._held else {}
         self._sampled.at(time, self._inputs(measured) | released)
-        x, v = self._moving(root, measured)
+        x, v = self._moving(measured)
         wanted, rate, _ = actuators.slow_motion(slow.axes, since, duration)
         ahead = actuators.slow_motion(slow.axes, since + 0.5 * T, duration)[2]
         command = ahead - actuators.PULL[0] * (x - wanted) - actuators.PULL[1] * (v - rate)
@@ -370,7 +367,7 @@ class RobotNode:
         self._deployed.keep_position(root, actuators.slow_motion(slow.position, since + T, duration)[0])
         return self._sampled.output("robot_effort")
 
-    def _moving(self, root: Context, measured: FloatArray) -> FloatArray:
+    def _moving(self, measured: FloatArray) -> FloatArray:
         """Return angle and joints, then their rates, as measured, shape (2, 1 + n)."""
         n, rate = self._joints, self._sampled.output("object_state")[5]
         joints, rates = measured[3 : 3 + n], measured[6 + n : 6 + 2 * n]
@@ -385,7 +382,7 @@ class RobotNode:
         said: Said = []
         index, margin = self._sampled.output("ready")
         cell = int(self._cell[0])
-        ready = index == cell and margin >= 0.0 and self._doubted == 0
+        ready = index == cell and margin >= 0.0
         again = self._said.cell == cell and self._number - self._reported >= self._timeout
         if again or ready != (self._said == msg.Ready(cell, True)):
             self._said, self._reported = msg.Ready(cell, bool(ready)), self._number
@@ -395,7 +392,7 @@ class RobotNode:
     def _requests(self) -> Said:
         """Return the robot's request that the team be held, where the scenario has holds."""
         asks, number = self._sampled.output("hold_request") if self._held else (0.0, -1.0)
-        return [msg.HoldRequest(bool(asks > 0.0) or self._doubted > 0, int(number))] if number >= 0.0 else []
+        return [msg.HoldRequest(bool(asks > 0.0), int(number))] if number >= 0.0 else []
 
     def release(self) -> None:
         """Free all memory."""

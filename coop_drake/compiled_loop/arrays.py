@@ -31,10 +31,8 @@ class LoopCells(NamedTuple):
         fields: What the velocity fields add to them.
         tables: The axes of all robots, shape (C, M, ``LAW_COLUMNS``).
         slices: Lower, then upper ends of the slices of (theta, q), shape (2, C, 1 + n) [rad or m].
-        numbers: Inradius R [m], K with which the cell is entered [1/s^2], longest time in it, of a team that
-            passes longest time at rest [s], and the target [m], shape (C, 5).
-        goal: Goal position, shape (2,) [m].
-        tolerance: Largest distance of the nominal position to it that counts as arrived [m].
+        numbers: Inradius R [m], K with which the cell is entered [1/s^2], and longest time in it, of a team
+            that passes longest time at rest [s], shape (C, 3).
         places: Of every robot the ``place`` of its ``ArrivalGoal``, one after the other, shape (3 N + n,).
         rooms: Of every robot its tolerances there, then its errors, shape (2, 2 N + n).
     """
@@ -48,8 +46,6 @@ class LoopCells(NamedTuple):
     tables: FloatArray
     slices: FloatArray
     numbers: FloatArray
-    goal: FloatArray
-    tolerance: float
     places: FloatArray
     rooms: FloatArray
 

@@ -14,7 +14,6 @@ from coop_drake.diagram.robot_controller import (
     RobotKnowledge,
     arrival_goal,
     governed_cells,
-    rest_tolerance,
     robot_knowledge,
 )
 from coop_drake.errors import ScenarioError
@@ -157,7 +156,7 @@ def _cells(scenario: Scenario, plan: Plan, maps: Sequence[HarmonicMap], joints: 
         patience(plan, i) if plan.motion is None else PATIENCE_ALLOWANCE for i in range(len(plan.cells))
     ]
     numbers = [
-        [each.inradius, governed_gains(cell.row, 0.0)[0], longest[i], *each.target]
+        [each.inradius, governed_gains(cell.row, 0.0)[0], longest[i]]
         for i, (each, cell) in enumerate(zip(plan.transitions, cells, strict=True))
     ]
     return LoopCells(
@@ -170,8 +169,6 @@ def _cells(scenario: Scenario, plan: Plan, maps: Sequence[HarmonicMap], joints: 
         np.array([law.table for law in axis_laws(plan, list(_axes(joints)))]),
         np.array([[cell.lower for cell in plan.cells], [cell.upper for cell in plan.cells]]),
         np.array(numbers),
-        np.array(plan.goal_pose[:2], dtype=float),
-        rest_tolerance(scenario, plan),
         np.concatenate([goal.place for goal in goals]),
         np.concatenate([np.array([goal.tolerances, goal.errors]) for goal in goals], axis=1),
     )

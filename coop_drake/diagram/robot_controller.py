@@ -105,10 +105,6 @@ class RobotKnowledge:
 
 # What every robot knows before a run, from scenario, plan and maps.
 
-REPORT_PERIODS = 2
-"""Periods in which p_G moves on in the old cell after a report was received [-]: the one in which the switch
-is made, and the one after which robots hear of it."""
-
 
 def robot_knowledge(
     scenario: Scenario, plan: Plan, maps: Sequence[HarmonicMap], team: TeamPlant
@@ -140,7 +136,7 @@ def robot_knowledge(
             load_share=scenario.load_share(robot.name, len(team.robots)),
             plan=plan,
             cells=cells,
-            position_tolerance=rest_tolerance(scenario, plan),
+            position_tolerance=float(scenario.goal.tolerances.position),
             period=deployment.period,
             sample_offset=deployment.of_robot(robot.name).sample_offset,
             predicted_periods=delay if control.predictor else 0,
@@ -208,19 +204,9 @@ def governed_cells(plan: Plan, maps: Sequence[HarmonicMap]) -> list[GovernedCell
     ]
 
 
-def rest_tolerance(scenario: Scenario, plan: Plan) -> float:
-    """Return how close to the goal the position that robots go by counts as arrived [m]."""
-    return float(scenario.goal.tolerances.position)
-
-
 def hold_of(scenario: Scenario, plan: Plan) -> Hold | None:
-    """Return when the team is held by its funnels' clock, None for never.
-
-    Where a plan has a budget, monitors may ask for it. A team that passes from cell to cell is held by words.
-    """
-    if plan.motion is not None:
-        return None
-    return scenario.control.hold
+    """Return when the team is held by its funnels' clock, None for never: a team that passes has words."""
+    return scenario.control.hold if plan.motion is None else None
 
 
 def arrival_goal(scenario: Scenario, plan: Plan, joints: slice) -> ArrivalGoal:
@@ -249,16 +235,6 @@ def arrival_goal(scenario: Scenario, plan: Plan, joints: slice) -> ArrivalGoal:
         errors[:] = budget.angle_noise
         errors[:2] = budget.single_noise * np.array([budget.position_noise, budget.angle_noise])
     return ArrivalGoal(np.array([*plan.goal_pose[:2], *turned]), np.array(rooms), errors)
-
-
-def report_periods(age: float, period: float) -> int:
-    """Return for how many periods a report is used.
-
-    Args:
-        age: How long a report may be used after it was made [s].
-        period: The control period [s].
-    """
-    return whole_periods(age, period) + REPORT_PERIODS
 
 
 def _robot(scenario: Scenario, index: int, factor: float) -> RobotPlant:

@@ -164,7 +164,7 @@ WIDEST_RETURN = 1.0
 about what is free."""
 
 RAMPED = 6.0
-"""mu t from which on the gain k1 counts as ramped in [-], as in the plan's budget."""
+"""mu t from which on the gain k1 counts as ramped in [-]."""
 
 
 def slow_samples(distance: float, period: float) -> int:

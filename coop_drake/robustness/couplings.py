@@ -102,20 +102,6 @@ def uncoupled(cells: Sequence[Cell]) -> Couplings:
     return Couplings(np.zeros((*rows, axes, axes)), np.zeros((*rows, 0, 2)), np.zeros((*rows, axes - 1)))
 
 
-def friction_pushes(budget: Budget, couplings: Couplings, rates: FloatArray | float) -> FloatArray:
-    """Return how much friction of joints accelerates the object's origin and every axis, shape (1 + axes,).
-
-    Args:
-        budget: The budget, with the friction of every joint, whose sign may change at any time.
-        couplings: Of all cells.
-        rates: Largest rates of the axes (theta, q...), or one for all [rad/s or m/s].
-    """
-    efforts, axes = couplings.efforts, couplings.efforts.shape[2] + 1
-    friction = budget.joint_coulomb + budget.joint_viscous * np.broadcast_to(rates, axes)[1:]
-    pushes: FloatArray = (efforts @ friction).max(axis=0)
-    return pushes
-
-
 class TeamCouplings(NamedTuple):
     """What a team's masses couple in the cells of a plan, which does not depend on how large departures are.
 

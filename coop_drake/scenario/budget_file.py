@@ -189,7 +189,7 @@ def _refuse_uncounted(scenario: Scenario, *, axes: bool) -> None:
 
 
 def _refuse_other_loops(scenario: Scenario) -> None:
-    """Refuse predictors and observers, which change the loops that tubes are computed for."""
+    """Refuse predictors and observers, which change the loops that departures are computed for."""
     for key in ("predictor", "observer"):
         if getattr(scenario.control, key):
             allowed = "false where a budget is asked for: its bounds are those of the loop without it"

@@ -375,7 +375,7 @@ class Watch:
         if self._observer is not None:
             self._observer(sample)
         if isinstance(self._loop, World) and (self._loop.link.trouble or self._loop.link.stopped):
-            self._see_stop(sample, margins, self._loop.link.trouble)
+            self._see_stop(margins, self._loop.link.trouble)
         elif margins.violation:
             self.violation = margins.violation
         elif (asking := self._beyond_holding(sample)) is not None:
@@ -426,7 +426,7 @@ class Watch:
                 f"tolerance off the goal: the object by {np.hypot(x, y):.3g} m and {abs(angle):.3g} rad"
             )
 
-    def _see_stop(self, sample: Sample, margins: Margins, trouble: str) -> None:
+    def _see_stop(self, margins: Margins, trouble: str) -> None:
         """Watch a team that does not follow the plan for contacts, until it does so again or cannot go on."""
         if not min(margins.workspace_clearance, margins.body_clearance) > 0.0:
             self.violation = f"{trouble or 'while the drives braked'}; {margins.violation}"
