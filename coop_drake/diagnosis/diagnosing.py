@@ -427,9 +427,9 @@ def blocked_pose(problem: PlanningProblem, floor: WidenedFloor, planner: Budgete
         blocked, slices = blocked_goal(grown)
         planner.spent += slices
         if blocked:
-            return Outcome(grown, Answer.INFEASIBLE)
+            return Outcome(Answer.INFEASIBLE)
         free = _worst(grown, _least_collision(grown)) <= 0.0
-        return Outcome(grown, Answer.FOUND if free else Answer.UNDECIDED)
+        return Outcome(Answer.FOUND if free else Answer.UNDECIDED)
 
     touched = tuple(contacts(problem.workspace, problem.tree, z))
     bracket = bracketed(ask, Amounts(FIRST_AT_GOAL, floor.most, RESOLUTION_AT_GOAL))

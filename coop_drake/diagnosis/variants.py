@@ -75,16 +75,14 @@ class Answer(Enum):
 
 @dataclass(frozen=True)
 class Outcome:
-    """A variant and its answer.
+    """The answer to a variant.
 
     Attributes:
-        problem: The variant.
         answer: What was computed; INFEASIBLE is a proof.
         path: Configurations from start to goal that are proved free, shape (m, 3 + n); None if there are
             none.
     """
 
-    problem: PlanningProblem
     answer: Answer
     path: FloatArray | None = None
 
@@ -109,7 +107,7 @@ class BudgetedPlanner:
         """
         self._report(stage)
         if self.spent >= self._total:
-            return Outcome(problem, Answer.UNDECIDED)
+            return Outcome(Answer.UNDECIDED)
         settings = replace(problem.settings, margin=0.0, max_slices=self._slices)
         variant = replace(problem, settings=settings)
         samples, proofs = SampledSearch(variant), Proofs(variant)
@@ -122,24 +120,24 @@ class BudgetedPlanner:
             (found,) = samples.attempts(1, progress=lambda _: self._report(stage))
             if found is not None:
                 path = densified(found.path, configuration_scale(variant.tree), STEP)
-                return Outcome(variant, Answer.FOUND, path)
+                return Outcome(Answer.FOUND, path)
         verdict = proofs.run(self._slices, progress=lambda _: self._report(stage))
         if verdict is Verdict.INFEASIBLE:
-            return Outcome(variant, Answer.INFEASIBLE)
+            return Outcome(Answer.INFEASIBLE)
         if verdict is not Verdict.FOUND:
-            return Outcome(variant, Answer.UNDECIDED)
+            return Outcome(Answer.UNDECIDED)
         try:
             channel = make_channel(variant, proofs.boxes(), 0.0, None)
             path = path_through(ended(variant, channel), channel)
         except (GeometryError, PlanError):  # A cell with a cusp: the channel is proved free all the same.
-            return Outcome(variant, Answer.FOUND)
-        return Outcome(variant, Answer.FOUND, densified(path, configuration_scale(variant.tree), STEP))
+            return Outcome(Answer.FOUND)
+        return Outcome(Answer.FOUND, densified(path, configuration_scale(variant.tree), STEP))
 
     def prove(self, problem: PlanningProblem, path: FloatArray) -> Outcome:
         """Try to prove a given path free in a variant; a failure proves nothing."""
         free, tried = is_free(problem, path)
         self.spent += tried // BOXES_PER_SLICE
-        return Outcome(problem, Answer.FOUND if free else Answer.UNDECIDED, path if free else None)
+        return Outcome(Answer.FOUND if free else Answer.UNDECIDED, path if free else None)
 
     def _report(self, stage: str) -> None:
         if self._progress is not None:

@@ -163,7 +163,6 @@ def build_separate_team(scenario: Scenario, builder: DiagramBuilder) -> Separate
     robots = tuple(
         replace(
             robot,
-            model_instance=base.model_instance(),
             base_body=base,
             joints=joints,
             gripper_frame=grasp.gripper_frame,

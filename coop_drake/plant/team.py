@@ -129,7 +129,6 @@ class RobotModel:
     Attributes:
         index: k, its place in the team.
         name: Name of the model that its base belongs to.
-        model_instance: Model instance of its base.
         base_body: Bk, the body that the base wrench acts on.
         joints: In the order of q_k, from the base outwards.
         joint_names: Their scoped names.
@@ -140,7 +139,6 @@ class RobotModel:
 
     index: int
     name: str
-    model_instance: ModelInstanceIndex
     base_body: RigidBody
     joints: tuple[Joint, ...]
     joint_names: tuple[str, ...]
@@ -246,7 +244,6 @@ def build_team_plant(scenario: Scenario, builder: DiagramBuilder) -> TeamPlant:
             RobotModel(
                 index=len(robots),
                 name=robot.name,
-                model_instance=base.model_instance(),
                 base_body=base,
                 joints=joints,
                 joint_names=tuple(scoped(plant, joint) for joint in joints),
@@ -343,7 +340,6 @@ class RobotPlant:
     Attributes:
         plant: Finalized, continuous time, without gravity or geometry.
         base_body: Bk.
-        base_joint: Moves Bk against the world.
         joints: In the order of q_k.
         gripper_frame: Ek.
         context: Its state, see ``set_state``, and its masses.
@@ -353,7 +349,6 @@ class RobotPlant:
 
     plant: MultibodyPlant
     base_body: RigidBody
-    base_joint: PlanarJoint
     joints: tuple[Joint, ...]
     gripper_frame: Frame
     context: Context
@@ -429,7 +424,6 @@ def _read_robot(scenario: Scenario, k: int) -> RobotPlant:
     return RobotPlant(
         plant,
         base,
-        base_joint,
         joints,
         GetScopedFrameByName(plant, robot.gripper_frame),
         plant.CreateDefaultContext(),

@@ -48,7 +48,9 @@ def test_grasps_bases_and_masses_of_shipped_teams_by_hand():
     assert (inertia.mass, inertia.inertia_about_com) == pytest.approx((1.0, 1.0))
     assert inertia.p_LLcm == pytest.approx([0.0, 0.0])
     for robot in three.robots:
-        bodies = [three.plant.get_body(i) for i in three.plant.GetBodyIndices(robot.model_instance)]
+        bodies = [
+            three.plant.get_body(i) for i in three.plant.GetBodyIndices(robot.base_body.model_instance())
+        ]
         masses = {body.name(): body.get_mass(context) for body in bodies}
         assert masses == pytest.approx({"base": 6.0, "link_1": 1.0, "link_2": 1.0})
     team, _builder = team_of(shipped("base"))
