@@ -266,6 +266,6 @@ class WordPlanner(_Speaker):
         words, (seen, robot) = state[: self._heard].reshape(-1, WORD_SIZE), state[self._more :]
         braked = (words[:-1, HOLD] == -inf) & (words[:-1, EPOCH] == words[-1, EPOCH])
         causes[:] = TOLD if seen == HELD else 0.0, *np.where(braked, BRAKED, 0.0)
-        # Before W has passed nobody can have been heard for long enough.
-        if seen in (DEPARTS, WAITS) and words[-1, STAMP] > self._schedule.window:
+        # By W all robots have heard each other, and are fit; by 2 W the supervisor has heard this of all.
+        if seen in (DEPARTS, WAITS) and words[-1, STAMP] > 2.0 * self._schedule.window:
             causes[1 + int(robot)] = ASKED if seen == DEPARTS else SILENT

@@ -69,7 +69,10 @@ def tell(
         for k in range(robots):
             braked = known[k, words.HOLD] == -np.inf and known[k, words.EPOCH] == known[robots, words.EPOCH]
             instant[4 + k] = BRAKED if braked else 0.0
-        if seen in (words.DEPARTS, words.WAITS) and known[robots, words.STAMP] > nominal.schedule.window:
+        if (
+            seen in (words.DEPARTS, words.WAITS)
+            and known[robots, words.STAMP] > 2.0 * nominal.schedule.window
+        ):
             instant[4 + who] = ASKED if seen == words.DEPARTS else SILENT
     instant[0], instant[1], instant[2] = current[0], current[1], 1.0 if arrived else 0.0
     robot, governors = np.empty(memory.state.size), memory.governors.copy()
