@@ -13,6 +13,7 @@ from coop_drake.jit import compiled
 from coop_drake.laws.ppc import (
     CLOSING,
     PEAK_RATE,
+    SATURATION,
     FunnelShape,
     axis_bounds,
     check_intervals,
@@ -170,7 +171,7 @@ class FixedGains:
     rate_gain: Positive = 1.0
     limit_gain: Positive = 25.0
     ramp_rate: NotNegative = 0.0
-    saturation: Saturation = 1e-7
+    saturation: Saturation = SATURATION
     hand_over_time: NotNegative = 0.0
     energy_factor: EnergyFactor = 1.2
     energy_allowance: Positive = 0.5
