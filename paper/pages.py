@@ -69,7 +69,7 @@ def _write_pictures(material: Material, folder: Path, tell: Progress) -> None:
         tell(run.gains, (0.1 + number) / (len(runs) + 0.6))
         pictures = folder / run.gains
         pictures.mkdir(exist_ok=True)
-        write_figures(problem.workspace, problem.tree, run.plan, run.log, pictures)
+        write_figures(problem, run.plan, run.log, pictures)
     tell("errata", 0.8)
     write_errata_figure(folder)
 

@@ -81,7 +81,7 @@ class DrawingProcesses:
         if self._figures:
             self._start("figures", _draw_figures)
         self._start("recording", _draw_recording)
-        self._send((scenario, problem.workspace, problem.tree, plan))
+        self._send((scenario, problem, plan))
 
     def draw(self, log: SimulationLog, folder: Path) -> None:
         """Begin to draw the run into a folder.
@@ -160,7 +160,7 @@ def _next(messages: Connection) -> Any:
 def _draw_recording(messages: Connection) -> None:
     from coop_drake.viz.recording import Recording
 
-    scenario, _, _, plan = _next(messages)
+    scenario, _, plan = _next(messages)
     recording = Recording(scenario, plan)
     log, folder = _next(messages)
     recording.write(log, folder / "transport.html")
@@ -169,11 +169,11 @@ def _draw_recording(messages: Connection) -> None:
 def _draw_figures(messages: Connection) -> None:
     from coop_drake.viz.figures import figures_of, write_figures
 
-    _, workspace, tree, plan = _next(messages)
+    _, problem, plan = _next(messages)
     os.nice(_AFTER_RECORDING)
     gc.freeze()  # Else each collection of garbage would look at all that was imported.
     log, folder = _next(messages)
-    run = workspace, tree, plan, log
+    run = problem, plan, log
     waiting, numbers = os.pipe()
     os.write(numbers, bytes(reversed(range(len(figures_of(*run))))))  # The summary takes longest.
     os.close(numbers)

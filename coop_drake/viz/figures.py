@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from functools import partial
+from math import inf
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -18,12 +19,14 @@ from shapely import Polygon
 from coop_drake.answers.log import SimulationLog
 from coop_drake.answers.plan import Plan
 from coop_drake.answers.problem import PlanningProblem, at_goal
-from coop_drake.answers.speeds import base_speeds
+from coop_drake.answers.speeds import base_speeds, steadiness
 from coop_drake.drawing import canvas
 from coop_drake.drawing.colours import BLUE, GREEN, GREY, INK, OBJECT, OUTSIDE, SKY, robot_colour
 from coop_drake.files import write_atomically
+from coop_drake.planning.motion_limits import largest_forces, motion_limits
 from coop_drake.tree.arrays import FloatArray
 from coop_drake.tree.component_tree import ComponentTree
+from coop_drake.verification.runs.bodies import component_stages, moved
 from coop_drake.viz.drawing_processes import joints_figure_name
 
 # Figures on the floor plan: question and plan, start and goal (Figure 4), path and footprints (Figure 5).
@@ -283,29 +286,157 @@ def joints_figure(tree: ComponentTree, log: SimulationLog, robot: int) -> Figure
     return figure
 
 
-def summary_figure(log: SimulationLog) -> Figure:
-    """Draw the clearances, which must stay above zero, the speeds and the bases' forces over time."""
+class _Curve(NamedTuple):
+    """A curve of the summary beside a limit.
+
+    Attributes:
+        label: What it shows.
+        of: Whose limit it is.
+        colour: Of the curve and of the limit.
+        times: Shape (T,) [s].
+        values: Shape (T,).
+        limit: Infinity where none is known.
+    """
+
+    label: str
+    of: str
+    colour: str
+    times: FloatArray
+    values: FloatArray
+    limit: float = inf
+
+
+_FAR = 6.0
+"""A limit that is larger than this times all values is named, not drawn, so that curves stay readable [-]."""
+
+_TITLE: dict[str, Any] = {"loc": "left", "fontsize": 9.0}
+"""Place and size [pt] of the words above a panel."""
+
+
+def summary_figure(problem: PlanningProblem, log: SimulationLog) -> Figure:
+    """Draw the speeds, accelerations and forces of a run beside their limits, and its clearances, over time.
+
+    Where the team passes from cell to cell without a stop, usual limits take the place of unknown ones.
+    """
     caption = (
-        "Summary. Smallest distance of the team to the walls and between bodies; speed of the object and of "
-        "the fastest base; force of the base with the largest one."
+        "Summary. Speeds, accelerations and base forces, with their limits (dashed); smallest distances of "
+        "the team to walls and between bodies."
     )
-    labels = ["clearance [m]", "speed [m/s]", "base force [N]"]
-    figure, (clearances, speeds, forces) = time_axes(log, caption, labels, switches=False)
-    times, moved = base_speeds(log)
-    object_speed = np.hypot(log.object_twist[:, 0], log.object_twist[:, 1])
-    strongest = np.hypot(log.base_wrenches[..., 0], log.base_wrenches[..., 1]).max(axis=1)
-    for ax, at, values, colour, label in (
-        (clearances, log.times, log.workspace_clearance, BLUE, "team to walls"),
-        (clearances, log.times, log.body_clearance, GREEN, "between bodies"),
-        (speeds, times, moved[..., 0].max(axis=1, initial=0.0), INK, "fastest base"),
-        (speeds, log.times, object_speed, OBJECT, "object"),
-        (forces, log.times, strongest, INK, "largest of all bases"),
+    labels = ["speed [m/s]", "acceleration [m/s²]", "base force [N]", "clearance [m]"]
+    figure, (speeds, accelerations, forces, clearances) = time_axes(
+        log, caption, labels, height=1.5, switches=False
+    )
+    ends, means = base_speeds(log)
+    of_object = partial(_Curve, "object", "the object", OBJECT, log.times)
+    of_bases = partial(_of_bases, log.robot_names)
+    limits, stops = _limits_in(problem, log), steadiness(log)[0]
+    of_speed = [
+        *of_bases("fastest base", ends, means[..., 0], limits[0]),
+        of_object(np.hypot(*log.object_twist.T[:2])),
+    ]
+    of_acceleration = [
+        *of_bases("most accelerated base", log.times, _base_accelerations(problem, log), limits[1]),
+        of_object(np.hypot(*log.accelerations.T[:2]), limits[3]),
+    ]
+    base_forces = np.hypot(*np.moveaxis(log.base_wrenches[..., :2], -1, 0))
+    _draw_beside_limits(speeds, of_speed, f", near stops on the way: {stops or 'none'}")
+    _draw_beside_limits(accelerations, of_acceleration)
+    _draw_beside_limits(forces, of_bases("base with the largest force", log.times, base_forces, limits[2]))
+    for values, colour, label in (
+        (log.workspace_clearance, BLUE, "team to walls"),
+        (log.body_clearance, GREEN, "between bodies"),
     ):
-        ax.plot(at, values, color=colour, linewidth=1.0, label=label)
-    for ax in (clearances, speeds, forces):
-        ax.set_ylim(bottom=min(0.0, ax.get_ylim()[0] if ax.dataLim.y0 < 0.0 else 0.0))
-        canvas.legend_above(ax)
+        clearances.plot(log.times, values, color=colour, linewidth=1.0, label=label)
+    nearest = min(log.workspace_clearance.min(), log.body_clearance.min())
+    clearances.set_title(f"at least {nearest:.3f} m", **_TITLE)
+    clearances.set_ylim(bottom=min(0.0, nearest))
+    canvas.legend_above(clearances)
     return figure
+
+
+def _limits_in(
+    problem: PlanningProblem, log: SimulationLog
+) -> tuple[FloatArray, FloatArray, FloatArray, float]:
+    """Return the limits of a run's bases, of speed, acceleration and force, and the object's of acceleration.
+
+    Those of the bases have the shape (N,), infinity for none [m/s, m/s^2, N, m/s^2].
+    """
+    of, robots = problem.limits, len(log.robot_names)
+    speeds, accelerations, forces = of.base_speeds, of.base_accelerations, of.base_forces
+    of_object = of.object_acceleration
+    if log.phases.size:
+        kept, forces = motion_limits(of), largest_forces(of)
+        of_object, speeds, accelerations = kept[:1, 1], kept[1 : 1 + robots, 0], kept[1 : 1 + robots, 1]
+    unknown = np.full(robots, inf)
+    speeds, accelerations, forces = (
+        each if each.size else unknown for each in (speeds, accelerations, forces)
+    )
+    return speeds, accelerations, forces, float(of_object.min(initial=inf))
+
+
+def _base_accelerations(problem: PlanningProblem, log: SimulationLog) -> FloatArray:
+    """Return the magnitude of the acceleration of the bases' origins by that of object and joints [m/s^2].
+
+    Its shape is (T, N), or (T, 0) where it is not known at which component bases are.
+    """
+    z, rates = np.hstack([log.object_pose, log.joints]), np.hstack([log.object_twist, log.joint_rates])
+    bases = zip(problem.limits.base_components, problem.limits.base_points, strict=True)
+    found = [
+        np.hypot(
+            *moved(np.array(point), component_stages(problem.tree, on), z, rates, log.accelerations)[2].T
+        )
+        for on, point in bases
+    ]
+    return np.array(found).reshape(-1, len(z)).T
+
+
+def _of_bases(
+    names: Sequence[str], of_all: str, times: FloatArray, values: FloatArray, limits: FloatArray
+) -> list[_Curve]:
+    """Return a curve for every limit that bases have, of the largest value of those that have it.
+
+    Values have the shape (T, N), limits (N,); where all are equal, the curve's label is ``of_all``.
+    """
+    found, known = [], [_short(limit) for limit in limits]
+    for shared in dict.fromkeys(known[: values.shape[1]]):
+        rows = [k for k, limit in enumerate(known) if limit == shared]
+        label, of, colour = of_all, "bases", INK
+        if len(rows) < len(known):  # A limit that is drawn names its curve by the colour.
+            of, colour = ", ".join(names[k] for k in rows), robot_colour(rows[0])
+            label = of if shared == "inf" else ""
+        largest = values[:, rows].max(axis=1, initial=0.0)
+        found.append(_Curve(label, of, colour, times, largest, float(limits[rows].min())))
+    return found
+
+
+def _short(limit: float) -> str:
+    """Return a limit with three digits, and without an exponent below a million."""
+    return f"{float(f'{limit:.3g}'):g}"
+
+
+def _draw_beside_limits(ax: Axes, curves: Sequence[_Curve], remark: str = "") -> None:
+    """Draw curves with their limits, and say above them how near to these they come."""
+    largest = max((float(curve.values.max(initial=0.0)) for curve in curves), default=0.0)
+    near = [curve.limit for curve in curves if curve.limit <= _FAR * largest]
+    top = 1.25 * max([largest, *near]) or 1.0
+    ax.set_ylim(0.0, top)
+    unit = ax.get_ylabel().partition("[")[2].rstrip("]")
+    for curve in curves:
+        ax.plot(curve.times, curve.values, color=curve.colour, linewidth=1.0, label=curve.label)
+    limited = [curve for curve in curves if curve.limit < inf]
+    for number, curve in enumerate(limited):
+        ax.axhline(curve.limit, color=curve.colour, linewidth=0.9, linestyle=(0, (5, 3)))
+        above = curve.limit > top
+        ax.annotate(
+            f"{'↑ ' if above else ''}limit of {curve.of}: {_short(curve.limit)} {unit}",
+            (0.995 - 0.3 * (number % 3), min(curve.limit, 0.88 * top) if above else curve.limit),
+            xycoords=ax.get_yaxis_transform(), xytext=(0, 2), textcoords="offset points",
+            color=curve.colour, fontsize=8, ha="right",
+        )  # fmt: skip
+    shares = [float(curve.values.max(initial=0.0)) / curve.limit for curve in limited]
+    near_to = f"at most {max(shares):.1%} of a limit" if shares else "no limit is known"
+    ax.set_title(near_to + remark, **_TITLE)
+    canvas.legend_above(ax)
 
 
 def curves_figure(log: SimulationLog, caption: str, values: FloatArray, *labels: str) -> Figure:
@@ -329,8 +460,7 @@ def _draw_funnel(ax: Axes, log: SimulationLog, axis: int, origin: FloatArray) ->
 
 
 def write_figures(
-    workspace: Polygon,
-    tree: ComponentTree,
+    problem: PlanningProblem,
     plan: Plan,
     log: SimulationLog,
     directory: Path,
@@ -342,7 +472,7 @@ def write_figures(
     Figures 10 and 11 show one robot each; those of further robots are called Figure 11, too. Where several
     processes write them, each gets the ``numbers`` of those that it shall write, see `figures_of`.
     """
-    written, known = [], figures_of(workspace, tree, plan, log)
+    written, known = [], figures_of(problem, plan, log)
     with canvas.house_style():
         for name, draw in known if numbers is None else (known[number] for number in numbers):
             figure = draw()
@@ -352,9 +482,10 @@ def write_figures(
 
 
 def figures_of(
-    workspace: Polygon, tree: ComponentTree, plan: Plan, log: SimulationLog
+    problem: PlanningProblem, plan: Plan, log: SimulationLog
 ) -> list[tuple[str, Callable[[], Figure | None]]]:
     """Name every figure of a run, with what draws it; a robot without joints has none of them."""
+    workspace, tree = problem.workspace, problem.tree
     curves, twist, wrench = partial(curves_figure, log), log.object_twist, log.object_wrench
     velocity, turning = (
         "Figure 8. Linear velocity of the object.",
@@ -375,5 +506,5 @@ def figures_of(
         ),
         ("fig12_force", partial(curves, force, wrench[:, :2], "x force [N]", "y force [N]")),
         ("fig13_torque", partial(curves, torque, wrench[:, 2:], "torque [N m]")),
-        ("summary", partial(summary_figure, log)),
+        ("summary", partial(summary_figure, problem, log)),
     ]

@@ -119,7 +119,7 @@ def report(material, tmp_path_factory):
     def dot(_figure, path, **_options):
         Image.new("RGB", (1, 1)).save(path)
 
-    def dots(_workspace, _tree, _plan, _log, directory):
+    def dots(_problem, _plan, _log, directory):
         for name in OF_EVERY_RUN + OF_TWO_ROBOTS:
             dot(None, directory / f"{name}.png")
 

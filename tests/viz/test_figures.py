@@ -12,6 +12,7 @@ from matplotlib.colors import to_hex
 from matplotlib.patches import FancyBboxPatch
 from PIL import Image
 
+from coop_drake.answers.problem import TeamLimits
 from coop_drake.answers.speeds import base_speeds
 from coop_drake.diagram import TELEMETRY
 from coop_drake.drawing.colours import INK, OBJECT, robot_colour
@@ -49,9 +50,9 @@ def with_sliding_joint(tree: ComponentTree) -> ComponentTree:
 
 
 def run_of(name):
-    """Floor, tree, plan and log of a run."""
+    """Question, plan and log of a run."""
     problem = case(name)
-    return problem.workspace, problem.tree, synthetic_plan(problem), synthetic_log(problem)
+    return problem, synthetic_plan(problem), synthetic_log(problem)
 
 
 def test_a_run_gets_figures_4_to_13_and_a_summary_as_png(tmp_path):
@@ -104,19 +105,108 @@ def test_figure_5_draws_the_path_that_was_logged_and_every_robot_in_its_colour_a
     assert [text.get_text() for text in axes.get_legend().get_texts()] == ["object", *log.robot_names]
 
 
-def test_the_summary_has_five_lines():
-    log = synthetic_log(case("three"))
-    clearances, speeds, forces = summary_figure(log).axes
-    np.testing.assert_array_equal(clearances.lines[0].get_ydata(), log.workspace_clearance)
-    np.testing.assert_array_equal(clearances.lines[1].get_ydata(), log.body_clearance)
+# The summary: what is drawn, beside which limits.
+
+
+def bases_of(tree: ComponentTree) -> tuple[int, ...]:
+    """The component of every robot's base: the last one that its joints carry."""
+    joints = [component.joint for component in tree.components]
+    robots = [-1 if joint is None else joint.robot for joint in joints]
+    return tuple(max(i for i, robot in enumerate(robots) if robot == k) for k in range(max(robots) + 1))
+
+
+def summary_of(name, *, passes, **limits):
+    """Question, log and panels of the summary of a run whose bases start to turn, with some limits."""
+    problem = case(name)
+    bases = bases_of(problem.tree)
+    known = TeamLimits(
+        bases, ((0.0, 0.0),) * len(bases), joint_rates=np.full(len(problem.tree.joints), np.inf)
+    )
+    problem, log = replace(problem, limits=replace(known, **limits)), synthetic_log(problem)
+    turning = np.zeros_like(log.accelerations)
+    turning[:, 2] = 3.0
+    log = replace(log, accelerations=turning, object_twist=np.zeros_like(log.object_twist))
+    log = replace(log, joint_rates=np.zeros_like(log.joint_rates))
+    phases = np.zeros((len(log.times), len(bases), 3)) if passes else log.phases
+    log = replace(log, phases=phases)
+    return problem, log, summary_figure(problem, log).axes
+
+
+def limits_drawn(axes):
+    """Heights and colours of the dashed lines of a panel."""
+    lines = [line for line in axes.lines if line.get_linestyle() == "--"]
+    return [(float(line.get_ydata()[0]), line.get_color()) for line in lines]
+
+
+def words_of(axes):
+    return [text.get_text() for text in axes.texts]
+
+
+def test_the_summary_shows_speeds_accelerations_forces_and_clearances():
+    problem, log = case("three"), synthetic_log(case("three"))
+    speeds, accelerations, forces, clearances = summary_figure(problem, log).axes
     fastest, of_object = speeds.lines
     assert fastest.get_ydata().max() == pytest.approx(base_speeds(log)[1][..., 0].max())
     np.testing.assert_allclose(of_object.get_ydata(), np.hypot(*log.object_twist[:, :2].T))
+    (of_object,) = accelerations.lines  # It is not known where the bases are.
+    np.testing.assert_allclose(of_object.get_ydata(), np.hypot(*log.accelerations[:, :2].T))
     (strongest,) = forces.lines
     np.testing.assert_allclose(
         strongest.get_ydata(), np.linalg.norm(log.base_wrenches[..., :2], axis=2).max(axis=1)
     )
+    np.testing.assert_array_equal(clearances.lines[0].get_ydata(), log.workspace_clearance)
+    np.testing.assert_array_equal(clearances.lines[1].get_ydata(), log.body_clearance)
     assert not any(isinstance(lines, LineCollection) and lines.get_segments() for lines in speeds.collections)
+    assert [ax.get_title(loc="left") for ax in (accelerations, forces)] == ["no limit is known"] * 2
+
+
+def test_a_base_is_accelerated_by_what_turns_the_object_under_it():
+    problem, log, (_, accelerations, *_) = summary_of("base", passes=False)
+    most, of_object = accelerations.lines
+    (x, y, _), poses = log.object_pose[0], problem.tree.poses(np.append(log.object_pose[0], log.joints[0]))
+    arms = [np.hypot(poses[i].x - x, poses[i].y - y) for i in bases_of(problem.tree)]
+    assert most.get_ydata()[0] == pytest.approx(3.0 * max(arms))
+    assert not of_object.get_ydata().any()
+
+
+def test_usual_limits_are_drawn_once_where_a_team_passes_and_none_where_it_rests():
+    assert [limits_drawn(ax) for ax in summary_of("base", passes=False)[2]] == [[], [], [], []]
+    _, _, (speeds, accelerations, forces, _) = summary_of("base", passes=True)
+    assert limits_drawn(speeds) == [(1.0, INK)]
+    assert limits_drawn(accelerations) == [(1.0, INK), (1.5, OBJECT)]
+    assert limits_drawn(forces) == []  # The masses are not known.
+    assert words_of(speeds) == ["limit of bases: 1 m/s"]
+    assert words_of(accelerations) == ["limit of bases: 1 m/s²", "limit of the object: 1.5 m/s²"]
+
+
+def test_bases_with_limits_of_their_own_have_curves_of_their_own_in_their_colours():
+    stated = np.array([0.5, 2.0, 0.5])
+    _, log, (speeds, *_) = summary_of("three", passes=False, base_speeds=stated)
+    slow, fast, _, *_ = speeds.lines
+    means = base_speeds(log)[1][..., 0]
+    np.testing.assert_array_equal(slow.get_ydata(), means[:, [0, 2]].max(axis=1))
+    np.testing.assert_array_equal(fast.get_ydata(), means[:, 1])
+    assert limits_drawn(speeds) == [(0.5, robot_colour(0)), (2.0, robot_colour(1))]
+    assert words_of(speeds) == ["limit of robot_0, robot_2: 0.5 m/s", "limit of robot_1: 2 m/s"]
+    share = max(means[:, [0, 2]].max() / 0.5, means[:, 1].max() / 2.0)
+    assert speeds.get_title(loc="left").startswith(f"at most {share:.1%} of a limit")
+
+
+def test_a_limit_that_is_far_from_all_values_is_named_and_does_not_press_the_curves_flat():
+    _, log, (_, _, forces, _) = summary_of("base", passes=False, base_forces=np.full(2, 1000.0))
+    assert words_of(forces) == ["↑ limit of bases: 1000 N"]
+    largest = np.linalg.norm(log.base_wrenches[..., :2], axis=2).max()
+    assert forces.get_ylim()[1] == pytest.approx(1.25 * largest)
+
+
+def test_stops_on_the_way_are_counted():
+    problem, log = case("base"), synthetic_log(case("base"))
+    stopped = log.object_twist.copy()
+    stopped[100:120] = stopped[200:220] = 0.0
+    speeds, *_ = summary_figure(problem, replace(log, object_twist=stopped)).axes
+    assert speeds.get_title(loc="left").endswith("near stops on the way: 2")
+    speeds, *_ = summary_figure(problem, log).axes
+    assert speeds.get_title(loc="left").endswith("near stops on the way: none")
 
 
 def test_figure_7_shows_the_angle_its_funnel_and_a_dashed_line_at_every_switch():
