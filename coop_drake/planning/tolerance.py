@@ -47,7 +47,7 @@ STIFFNESSES = (25.0, 50.0, 80.0, 120.0, 160.0, 200.0, 260.0, 350.0, 500.0)
 DAMPINGS = (1.4, 2.0, 2.6)
 """zeta_t over the root of K_t that are tried [-]: 2 is critical damping, 1.4 a damping ratio of 0.7."""
 
-PACES = (1.0, 0.8, 0.6, 0.4)
+PACES = (1.0, 0.9, 0.8, 0.7, 0.6, 0.5, 0.4)
 """Shares of the limits of speed that motions are planned with, in this order [-]; those of accelerations are
 the squares."""
 
@@ -214,13 +214,17 @@ def _least_departures(
     if not stable:
         return "no gains hold the team to its motion under the delay, the lag and the model's error"
 
-    def softest(rooms: list[float]) -> Gains:
-        """Of gains that need hardly more room than the least, those that follow the noise least."""
-        near = [own for (own, _), room in zip(stable, rooms, strict=True) if room <= NEARLY * min(rooms)]
-        return min(near, key=lambda own: own[1])
+    def softest(part: slice) -> Gains:
+        """Of gains that need hardly more room than the least, those that follow the noise least.
 
-    position = softest([float(away.room[0]) for _, away in stable])
-    gains = position, softest([float(away.room[1:].max()) for _, away in stable])
+        Gains that leave the team too far from its goal only count where there are no others.
+        """
+        near_goal = [found for found in stable if (found[1].rest[part] <= tolerances[part]).all()]
+        rooms = [(own, float(away.room[part].max())) for own, away in near_goal or stable]
+        least = min(room for _, room in rooms)
+        return min((own for own, room in rooms if room <= NEARLY * least), key=lambda own: own[1])
+
+    gains = softest(slice(0, 1)), softest(slice(1, None))
     best = departures_of(gains, budget, moving, team.couplings)
     assert best is not None  # each of its loops is stable
     if not (best.rest <= tolerances).all():

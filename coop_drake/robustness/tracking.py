@@ -65,6 +65,10 @@ ATTEMPTS, GROWTH = 40, 1.01
 """Largest number of larger and larger pulls that are tried, and by which factor each is larger [-]."""
 
 
+CALMING = 3
+"""How often the pulls of a team whose motion has ended are bounded anew by what they cause themselves [-]."""
+
+
 class Moving(NamedTuple):
     """Bounds of a motion in every cell, at any pace, of the position, theta and q, shape (cells, 2 + n) each.
 
@@ -329,7 +333,10 @@ def stated_departures(loop: Loop, moving: Moving, couplings: Couplings, pulled: 
     budget = loop.budget
     found, first, random = departures_after(loop, moving, couplings, pulled)
     still = Moving(*(np.zeros(part.shape) for part in moving))
-    rest = departures_after(loop, still, couplings, pulled)[0][0]
+    calm = pulled
+    for _ in range(CALMING):
+        calm = departures_after(loop, still, couplings, calm)[0][3]
+    rest = departures_after(loop, still, couplings, calm)[0][0]
     t, wide, noise = unknown_time(budget), 1.0 + SLACK, noises(budget, moving)
     wrong = noise + budget.age_error * first
     own = wrong.copy()
