@@ -401,6 +401,8 @@ def quickest_motion(
             last.solve(weights)
             if not last.uniform or last.slow_down() < MUCH_SLOWER:
                 break
+    if not (np.diff(last.windows[:, 1]) > 0.0).all():
+        raise PlanError("a cell is not left after the one before it")
     period = float(last.points[2, -1] - last.points[1, -1])
     made = last.points[:, :-1].copy(), period, period * last.windows, last.kappa.copy()
     return Motion(*made, waiting, BRAKE_RAMP, last.start_rate, gains)
@@ -500,6 +502,9 @@ class _Program:
             while high + 1 < inside.shape[1] and inside[cell, high + 1]:
                 high += 1
             self.first[cell], self.last[cell] = low, high
+        # Robots expect that cells are left one after the other.
+        for cell in range(cells - 2, -1, -1):
+            self.last[cell] = min(self.last[cell], max(self.first[cell + 1], self.last[cell + 1] - 1))
         self.windows = np.stack([self.first, self.last + 1], axis=1) / parts
         numbers = np.arange(inside.shape[1])
         held = (self.first[:, None] <= numbers) & (numbers <= self.last[:, None])

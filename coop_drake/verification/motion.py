@@ -139,8 +139,9 @@ def _windows(motion: Motion) -> FloatArray:
         if not (tau == 0.0 if i == 0 else before[0] < tau < before[1]):
             allowed = "0 s" if i == 0 else f"a time after {before[0]} and before {before[1]} s"
             raise RefusalError(where, f"begins at {tau} s; expected {allowed}")
-        if not (tau < duration * (1.0 - RELATIVE) and tau < x <= duration * (1.0 + RELATIVE)):
-            raise RefusalError(where, f"ends at {x} s; expected a time after {tau} s, up to {duration} s")
+        after = tau if i == 0 else max(tau, before[1])
+        if not (tau < duration * (1.0 - RELATIVE) and after < x <= duration * (1.0 + RELATIVE)):
+            raise RefusalError(where, f"ends at {x} s; expected a time after {after} s, up to {duration} s")
         before = tau, x
     if not before[1] >= duration * (1.0 - RELATIVE):
         finding = f"ends at {before[1]} s; the motion ends at {duration} s"

@@ -2,21 +2,25 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import shapely
 from scipy.interpolate import BSpline
 
 from coop_drake.answers.motion import WAITING
+from coop_drake.answers.plan import Cell
 from coop_drake.laws import ScheduledGains
 from coop_drake.planning.duration import plan_time, timed
-from coop_drake.planning.motion import BRAKE_RAMP
+from coop_drake.planning.motion import BRAKE_RAMP, quickest_motion
 from coop_drake.planning.motion_barrier import Slopes
 from coop_drake.planning.motion_limits import base_chains, base_places, follow, motion_limits
 from coop_drake.planning.motion_step import newton_step
 from coop_drake.planning.transitions import share_speeds
+from coop_drake.plant import planning_problem
 from coop_drake.tree.arrays import FloatArray
-from tests.support.motions import planned_motion
+from tests.support.motions import planned_motion, small_motion
 
 
 class Case:
@@ -65,6 +69,19 @@ class Case:
 @pytest.fixture(scope="module", params=["base", "elbow"])
 def case(request: pytest.FixtureRequest) -> Case:
     return Case(request.param)
+
+
+def test_cells_are_left_one_after_the_other_where_several_hold_the_end() -> None:
+    scenario, plan = small_motion()
+    assert plan.motion is not None
+    last, near = plan.cells[-1], shapely.Point(plan.goal_pose[:2]).buffer(0.2)
+    smaller = Cell(last.lower, last.upper, shapely.intersection(last.tidied, near))
+    cells, transitions = (*plan.cells, smaller), (*plan.transitions, plan.transitions[-1])
+    longer, problem = replace(plan, cells=cells, transitions=transitions), planning_problem(scenario)
+    motion = quickest_motion(longer, problem, motion_limits(problem.limits), plan.motion.gains)
+    assert len(motion.windows) == len(cells)
+    assert (np.diff(motion.windows, axis=0) > 0.0).all()
+    assert motion.windows[-1, 1] == pytest.approx(motion.duration)
 
 
 def test_it_begins_and_ends_at_rest(case: Case) -> None:

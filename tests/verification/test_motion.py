@@ -175,11 +175,15 @@ ALTERED = {
     ),
     "a gap between windows": (lambda m: moved_window(m, 5, 0, m.windows[4, 1]), r"motion\.windows\[5\]"),
     "two begin together": (lambda m: moved_window(m, 5, 0, m.windows[4, 0]), r"motion\.windows\[5\]"),
+    "left before the one before it": (
+        lambda m: moved_window(m, 5, 1, m.windows[4, 1]),
+        r"motion\.windows\[5\]: ends",
+    ),
     "a window without time": (lambda m: moved_window(m, 5, 1, m.windows[5, 0]), r"motion\.windows\[5\]"),
     "a window backwards": (lambda m: {"windows": m.windows[:, ::-1]}, r"motion\.windows\[0\]"),
     "ends after the end": (lambda m: moved_window(m, -1, 1, 1.001 * m.duration), r"motion\.windows\[END\]"),
     "ends before the end": (lambda m: moved_window(m, -1, 1, 0.999 * m.duration), r"motion\.windows\[END\]"),
-    "left later": (lambda m: moved_window(m, 3, 1, m.windows[3, 1] + 0.4), r"motion\.windows\[3\]: from"),
+    "left later": (lambda m: moved_window(m, 3, 1, m.windows[4, 1] - 1e-3), r"motion\.windows\[3\]: from"),
     "entered earlier": (
         lambda m: moved_window(m, 10, 0, 0.8 * m.windows[9, 0] + 0.2 * m.windows[10, 0]),
         r"motion\.windows\[10\]: from",
