@@ -20,7 +20,7 @@ _LARGEST = 1_000_000
 _LARGEST_FILE = 4.0
 """Largest file [MB]; it takes some seconds. A floor with more corners can stand in a drawing beside it."""
 
-_FLOAT = re.compile(r"[-+]?\d[\d_]*(\.[\d_]*)?[eE][-+]?\d+")
+_FLOAT = re.compile(r"[-+]?\d[\d_]*(\.[\d_]*)?[eE][-+]?\d+\Z")
 """Numbers that YAML 1.2 knows and YAML 1.1 takes for texts, such as ``1e-3``."""
 
 T = TypeVar("T")
@@ -51,6 +51,7 @@ class _Dumper(yaml.SafeDumper):
 
 
 _Dumper.add_representer(dict, _Dumper.mapping)
+_Dumper.add_implicit_resolver("tag:yaml.org,2002:float", _FLOAT, list("-+0123456789"))  # Quotes such texts.
 
 
 def write(data: object) -> str:
