@@ -23,7 +23,7 @@ from coop_drake.apart.membership import Stop
 from coop_drake.diagram import control_period
 from coop_drake.errors import PlanError
 from coop_drake.harmonic_maps import HarmonicMap
-from coop_drake.scenario import Deployment, Scenario
+from coop_drake.scenario import Deployment, Scenario, with_gains
 from coop_drake.simulation import Sample, build_maps, simulate
 
 _TEAMS = (2, 4, 8)
@@ -112,8 +112,8 @@ def stops_tasks() -> list[Task]:
 
 def _rows(team: str, _: Sequence[Row]) -> list[Row]:
     ideal = load_scenario(team)
-    rests, deployment = replace(ideal.planner, hand_over="rest"), deployment_of({"preset": "mobile_base"})
-    scenario = replace(ideal, planner=rests, deployment=deployment)
+    resting = with_gains(ideal, "scheduled")
+    scenario = replace(resting, deployment=deployment_of({"preset": "mobile_base"}))
     answer = plan(scenario)
     if not isinstance(answer, Found):
         raise PlanError(f"{scenario.path}: no plan to stop: {answer.reason}")

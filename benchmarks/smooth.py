@@ -20,6 +20,7 @@ from coop_drake.compiled_loop import prepare, run
 from coop_drake.compiling import COMPILING
 from coop_drake.errors import PlanError
 from coop_drake.plant import planning_problem
+from coop_drake.scenario import with_gains
 from coop_drake.scenario.model import RobotLimits
 from coop_drake.simulation import simulate
 from coop_drake.tree.arrays import FloatArray
@@ -47,8 +48,7 @@ def smooth_tasks() -> list[Task]:
 
 def _scenario(team: str, **changes: object) -> Scenario:
     scenario = load_scenario(team)
-    passing = replace(scenario.planner, hand_over="pass")
-    return replace(scenario, limits=_LIMITS, planner=passing, **changes)  # type: ignore[arg-type]
+    return replace(scenario, limits=_LIMITS, **changes)  # type: ignore[arg-type]
 
 
 def _planned(scenario: Scenario) -> tuple[Plan, float]:
@@ -66,8 +66,7 @@ def _ideal(team: str, _: Sequence[Row]) -> list[Row]:
     """Return how the ideal team passes, beside the quickest way known, and what planning takes."""
     scenario, name = _scenario(team), f"smooth/ideal/{team}"
     made, seconds = _planned(scenario)
-    resting = replace(scenario, planner=replace(scenario.planner, hand_over="rest"))
-    others, of_others = _planned(resting)
+    others, of_others = _planned(with_gains(scenario, "scheduled"))
     estimated = sum(one.estimated_time for one in others.transitions)
     log = simulate(scenario, made, build_maps(made))
     dips, switches = dips_of(log)

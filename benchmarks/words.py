@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 from time import process_time
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
@@ -18,7 +18,7 @@ from coop_drake.compiled_loop import CompiledTransport, prepare, run
 from coop_drake.compiling import COMPILING
 from coop_drake.errors import PlanError
 from coop_drake.harmonic_maps import HarmonicMap
-from coop_drake.scenario import Deafness, RobotDepartures, Silence
+from coop_drake.scenario import Deafness, RobotDepartures, Silence, with_gains
 from coop_drake.scenario.model import RobotLimits
 from coop_drake.simulation import simulate
 
@@ -53,16 +53,13 @@ def word_tasks() -> list[Task]:
     return [*faults, Task("words/cost", _cost, alone=True)]
 
 
-def _planned(
-    team: str, hand_over: Literal["rest", "pass"]
-) -> tuple[CompiledTransport, Sequence[HarmonicMap]]:
+def _planned(team: str, gains: str | None = None) -> tuple[CompiledTransport, Sequence[HarmonicMap]]:
     """Return a shipped transport along its plan, ready to run."""
-    scenario = load_scenario(team)
+    scenario = with_gains(load_scenario(team), gains)
     scenario = replace(
         scenario,
-        deployment=deployment_of({**_DEPLOYMENT, "budget": "all" if hand_over == "pass" else "none"}),
+        deployment=deployment_of({**_DEPLOYMENT, "budget": "none" if gains else "all"}),
         limits=_LIMITS,
-        planner=replace(scenario.planner, hand_over=hand_over),
     )
     result = plan(scenario)
     if not isinstance(result, Found):
@@ -75,7 +72,7 @@ def _planned(
 
 def _parted(team: str, fault: str, _: Sequence[Row]) -> list[Row]:
     """Return how many runs arrived and were held, and how far nominal positions of robots were apart."""
-    transport, _maps = _planned(team, "pass")
+    transport, _maps = _planned(team)
     undisturbed, motion = run(transport), transport.plan.motion
     assert motion is not None  # as in every plan of a team that passes
     random, outcomes = np.random.default_rng(0), []
@@ -104,12 +101,11 @@ def _parted(team: str, fault: str, _: Sequence[Row]) -> list[Row]:
 def _cost(_: Sequence[Row]) -> list[Row]:
     """Return processor times of a run of ``base``: passing and resting, in the compiled loop and in Drake."""
     rows = []
-    ways: tuple[Literal["pass", "rest"], ...] = ("pass", "rest")
-    for hand_over in ways:
-        transport, maps = _planned("base", hand_over)
+    for way, gains in (("pass", None), ("rest", "scheduled")):
+        transport, maps = _planned("base", gains)
         compiled = _seconds(partial(run, transport))
         drake = _seconds(partial(_simulate, transport.scenario, transport, maps))
-        name = f"words/cost/{hand_over}"
+        name = f"words/cost/{way}"
         rows.append(Row(f"{name}/compiled", 1e3 * compiled, "ms", "Drake's loop", 1e3 * drake))
         rows.append(Row(f"{name}/simulated", run(transport).time, "s"))
     return rows

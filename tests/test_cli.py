@@ -75,15 +75,13 @@ RUN_KEYS = PLAN_KEYS | {
     "max_wrench_error_n",
     "max_governor_spread_m",
     "messages",
-    "max_map_residual",
-    "mapping_wall_seconds",
     "simulated_seconds",
     "simulation_wall_seconds",
 }
+MAP_KEYS = {"max_map_residual", "mapping_wall_seconds"}
 RESULTS = [
     ".coop_drake_results.json",
     "log.npz",
-    "maps.json",
     "plan.json",
     "summary.png",
     "table_1.md",
@@ -100,6 +98,13 @@ def room(tmp_path_factory):
 def finished(room, tmp_path_factory):
     out = tmp_path_factory.mktemp("finished")
     return out, invoke("run", room, "--out", out, "--json")
+
+
+@pytest.fixture(scope="module")
+def rested(room, tmp_path_factory):
+    """A run of the team that rests in every cell."""
+    out = tmp_path_factory.mktemp("rested")
+    return out, invoke("run", room, "--gains", "scheduled", "--out", out, "--json")
 
 
 def test_a_run_answers_with_one_json_object_and_exit_code_0(finished):
@@ -124,6 +129,14 @@ def test_a_run_leaves_plan_log_table_recording_and_figures(finished):
     assert facts["cells"] == len(load_plan(out / "plan.json").cells)
     assert facts["simulated_seconds"] == pytest.approx(log.times[-1])
     assert facts["min_clearance_m"] == min(log.workspace_clearance.min(), log.body_clearance.min())
+
+
+def test_a_run_of_a_team_that_rests_leaves_the_accuracies_of_its_maps_too(rested):
+    out, result = rested
+    assert result.exit_code == 0, result.stderr
+    assert json.loads(result.stdout).keys() >= RUN_KEYS | MAP_KEYS
+    names = sorted(path.name for path in out.iterdir() if not path.name.startswith("fig"))
+    assert names == sorted([*RESULTS, "maps.json"])
 
 
 def test_the_log_of_a_run_is_verified_and_an_altered_one_refused(finished, room, tmp_path):
@@ -161,20 +174,27 @@ def drawn(monkeypatch):
     return NoDrawings.asked
 
 
-def test_a_plan_made_before_is_carried_out_with_other_gains(finished, room, tmp_path, drawn):
-    out, _ = finished
+def test_a_plan_made_before_is_carried_out_with_other_gains(rested, room, tmp_path, drawn):
+    out, _ = rested
     result = invoke(
         "simulate", room, "--plan", out / "plan.json", "--out", tmp_path, "--gains", "table_2", "--json"
     )
     assert result.exit_code == 0, result.stderr
     facts = json.loads(result.stdout)
-    assert facts.keys() >= RUN_KEYS
+    assert facts.keys() >= RUN_KEYS | MAP_KEYS
     assert facts["gains"] == "table_2"
     assert facts["maps_read"] == facts["maps"] > 0  # the run before left them in the cache
     assert (tmp_path / "maps.json").read_bytes() == (out / "maps.json").read_bytes()
     assert not (tmp_path / "plan.json").exists()
     assert [directory for _, directory in drawn] == [tmp_path]
     assert NoDrawings.order == ["recording", "figures"]
+
+
+def test_a_motion_is_not_carried_out_with_a_gain_set(finished, room, tmp_path):
+    plan = finished[0] / "plan.json"
+    refused = invoke("simulate", room, "--plan", plan, "--out", tmp_path, "--gains", "table_2")
+    assert refused.exit_code == 2
+    assert f"{plan}: its team passes from cell to cell" in " ".join(refused.stderr.split())
 
 
 @pytest.mark.parametrize(("deployment", "warned"), [({}, False), ({"preset": "mobile_base"}, True)])

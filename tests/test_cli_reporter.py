@@ -81,7 +81,7 @@ def test_a_plan_states_its_estimate_and_leaves_out_what_is_not_known():
     rows = dict(summary_rows(PLANNED))
     assert rows["answer"] == "found"
     assert rows["estimated transport"] == "13.3 s"
-    assert not {"simulated transport", "nearest to a limit of speed", "error at the end"} & rows.keys()
+    assert not {"simulated transport", "nearest to a limit of motion", "error at the end"} & rows.keys()
     assert "first plan certified after" not in dict(summary_rows(PLANNED, verbose=True))
 
 
@@ -90,7 +90,7 @@ def test_a_run_has_ten_rows_and_names_the_speed_that_is_nearest_to_its_limit():
     assert len(rows) == 10
     assert rows["peak speed of the object"] == "1.74 m/s"
     assert rows["simulated transport"] == "13.42 s, estimated 13.3 s"
-    assert rows["nearest to a limit of speed"] == "rate of left::elbow, 4.00 rad/s, limit 5"
+    assert rows["nearest to a limit of motion"] == "rate of left::elbow, 4.00 rad/s, limit 5"
     assert rows["error at the end"] == "0.0056 m, 0.0015 rad"
 
 

@@ -76,7 +76,6 @@ def plan_with_budgets(case: Case) -> dict[str, Planned]:
         case: The scenario.
     """
     scenario = replace(case.scenario(), deployment=deployment_of({"preset": "mobile_base"}))
-    scenario = replace(scenario, planner=replace(scenario.planner, hand_over="pass"))
     problem = planning_problem(scenario, build_team_plant(scenario, DiagramBuilder()))
     budgets: dict[str, Budget | None] = {
         label: None if choice is None else budget_of(choice, scenario, problem)

@@ -22,6 +22,14 @@ FRICTION, GRAVITY = 0.5, 9.81
 JOINT_RATE, JOINT_ACCELERATION, OBJECT_ACCELERATION = 1.0, 2.0, 1.5
 """Limits of joints and of the object of which nothing is known [rad/s, rad/s^2; m/s, m/s^2; m/s^2]."""
 
+USUAL_LIMITS = (
+    f"bases {BASE_SPEED:g} m/s, {TURN_RATE:g} rad/s, {BASE_ACCELERATION:g} m/s^2, "
+    f"{TURN_ACCELERATION:g} rad/s^2, {BASE_JERK:g} m/s^3 and a force of {FRICTION:g} of the weight that they "
+    f"move; joints {JOINT_RATE:g} rad/s and {JOINT_ACCELERATION:g} rad/s^2; the object "
+    f"{OBJECT_ACCELERATION:g} m/s^2"
+)
+"""These limits in words."""
+
 WAITING = 0.128
 """2 W for words that are up to 50 ms old, clocks that are 2 ms off and a control period of 5 ms [s]:
 W = 50 ms + 2 * 2 ms + 2 * 5 ms."""

@@ -1,11 +1,14 @@
 """What the planner is asked: workspace, tree, start, goal and settings; plain data, no Drake."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass, field, replace
 from typing import Annotated, Literal
 
 import numpy as np
 from shapely import Polygon
 
+from coop_drake.answers import motion
 from coop_drake.tree.arrays import FloatArray
 from coop_drake.tree.component_tree import Bodies, Component, ComponentTree
 from coop_drake.typed_data import Bounds, Limits, NotNegative, Positive
@@ -57,6 +60,28 @@ class TeamLimits:
         """Whether there is a limit of a speed or rate."""
         return bool(np.isfinite(np.concatenate((self.base_speeds, self.turn_rates, self.joint_rates))).any())
 
+    def with_defaults(self) -> TeamLimits:
+        """Return the limits of a team that passes from cell to cell: usual ones where nothing is stated."""
+
+        def known(stated: FloatArray, count: int, otherwise: float) -> FloatArray:
+            stated = stated if stated.size else np.full(count, np.inf)
+            return np.where(np.isfinite(stated), stated, otherwise)
+
+        bases, joints = len(self.base_components), len(self.joint_rates)
+        return replace(
+            self,
+            base_speeds=known(self.base_speeds, bases, motion.BASE_SPEED),
+            turn_rates=known(self.turn_rates, bases, motion.TURN_RATE),
+            joint_rates=known(self.joint_rates, joints, motion.JOINT_RATE),
+            joint_accelerations=known(self.joint_accelerations, joints, motion.JOINT_ACCELERATION),
+            base_accelerations=known(self.base_accelerations, bases, motion.BASE_ACCELERATION),
+            turn_accelerations=known(self.turn_accelerations, bases, motion.TURN_ACCELERATION),
+            base_jerks=known(self.base_jerks, bases, motion.BASE_JERK),
+            object_acceleration=known(self.object_acceleration, 1, motion.OBJECT_ACCELERATION),
+            frictions=known(self.frictions, bases, motion.FRICTION),
+            base_forces=known(self.base_forces, bases, np.inf),
+        )
+
 
 LIMIT_ROOM = 0.01
 """A joint may be planned this far around its start and its goal, even beyond a limit [rad].
@@ -87,8 +112,6 @@ class PlannerSettings:
             default. It counts samples and moves, not seconds.
         strategy: ``portfolio`` samples, certifies and proves; ``cells`` explores by cells alone, and
             ``paper`` as the paper's algorithms are printed, both at margin zero.
-        hand_over: ``rest``: the team rests in every cell before it enters the next one, as the paper's does;
-            ``pass``: it passes without a stop, at a pace from which it can stop, within ``limits``.
     """
 
     margin: NotNegative = 0.1
@@ -100,7 +123,6 @@ class PlannerSettings:
     max_transition_time: Positive = 60.0
     effort: Annotated[float, Limits(at_least=0.0, at_most=1000.0)] = 1.0
     strategy: Literal["portfolio", "cells", "paper"] = "portfolio"
-    hand_over: Literal["rest", "pass"] = "rest"
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,6 +148,8 @@ class PlanningProblem:
         joint_tolerance: Final tolerance of joints that have a goal, of all or of each, shape (n,) [rad or m].
         settings: How hard to try.
         limits: Largest speeds of bases and joints.
+        passes: Whether the team passes from cell to cell without a stop, at a pace from which it can stop;
+            otherwise it rests in every cell before it enters the next one, as the paper's does.
         roomy: Whether joints at their limits are given room; False for variants of a question.
     """
 
@@ -139,7 +163,13 @@ class PlanningProblem:
     joint_tolerance: float | FloatArray = 0.02
     settings: PlannerSettings = field(default_factory=PlannerSettings)
     limits: TeamLimits = field(default_factory=TeamLimits)
+    passes: bool = False
     roomy: bool = True
+
+    @property
+    def kept_limits(self) -> TeamLimits:
+        """The limits that the team keeps: those that are known, and usual ones where it passes."""
+        return self.limits.with_defaults() if self.passes else self.limits
 
     def __post_init__(self) -> None:
         """Give room to joints at their limits."""

@@ -74,9 +74,10 @@ def steadiness(log: SimulationLog) -> tuple[int, float]:
 def peak_speeds(log: SimulationLog, problem: PlanningProblem) -> list[PeakSpeed]:
     """Return the largest speeds of a run: of every base, then of every joint in q's order.
 
-    Then the largest accelerations and efforts of the joints that have limits of these.
+    Then the largest accelerations and efforts of the joints, and the acceleration of the object, that have
+    limits.
     """
-    peaks, limits, found = base_speeds(log)[1].max(axis=0, initial=0.0), problem.limits, []
+    peaks, limits, found = base_speeds(log)[1].max(axis=0, initial=0.0), problem.kept_limits, []
     for k, name in enumerate(log.robot_names):
         found.append(_peak(f"speed of {name}", peaks[k, 0], limits.base_speeds[k], "m/s"))
         found.append(_peak(f"turn rate of {name}", peaks[k, 1], limits.turn_rates[k], "rad/s"))
@@ -94,6 +95,9 @@ def peak_speeds(log: SimulationLog, problem: PlanningProblem) -> list[PeakSpeed]
         ):
             if np.isfinite(most[i]):
                 found.append(_peak(f"{what} of {joint.name}", peaks[i], most[i], unit))
+    if np.isfinite(limits.object_acceleration).any():
+        peak, most = np.hypot(*log.accelerations[:, :2].T).max(initial=0.0), limits.object_acceleration
+        found.append(_peak("acceleration of the object", peak, most[0], "m/s²"))
     return found
 
 

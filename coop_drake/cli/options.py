@@ -90,7 +90,8 @@ GainsName = Annotated[
     typer.Option(
         "--gains",
         metavar="NAME|FILE",
-        help="Gain set, by name or from a file as `tune` writes it; the scenario's choice by default.",
+        help="Rest in every cell with this gain set, by name or from a file as `tune` writes it; by default "
+        "what the scenario selects, or else pass from cell to cell without a stop.",
         autocompletion=complete_gains,
     ),
 ]

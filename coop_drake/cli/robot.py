@@ -53,6 +53,7 @@ def robot_command(
     """Prepare a robot model that others wrote: meshes become hulls, all files go into one folder."""
     packages = {name: Path(folder) for name, folder in _pairs(package, "--package")}
     values = {name: _number(value) for name, value in _pairs(fix, "--fix")}
+    from coop_drake.answers.motion import USUAL_LIMITS
     from coop_drake.errors import ScenarioError
     from coop_drake.files import write_atomically
     from coop_drake.plant.importing import (
@@ -88,6 +89,7 @@ def robot_command(
     reporter.say(
         f"The model is {escape(str(target))}; a scenario uses it with these lines:\n\n{escape(lines)}"
     )
+    reporter.say(f"Where `limits` in the scenario and the models state none: {USUAL_LIMITS}")
     if frame != GRIPPER:
         reporter.say(f"LINK: a link or frame of the model; --gripper LINK adds a frame {GRIPPER} there")
 

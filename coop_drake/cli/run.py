@@ -26,6 +26,7 @@ from coop_drake.cli.reporter import ExitCode, Reporter
 from coop_drake.cli.results import ResultFolder
 from coop_drake.cli.summary import (
     beyond_budget,
+    beyond_limits,
     budget_facts,
     process_lines,
     simulation_facts,
@@ -157,8 +158,7 @@ def _record(
     with reporter.stage("recording", "drawing"):
         drawing.wait("recording")
     reporter.table(task.name, summary_rows(reporter.facts, verbose=reporter.verbose))
-    if task.scenario.planner.hand_over == "rest":  # Else there are limits by default.
-        _warn_of_unknown_limits(reporter)
+    _warn_of_limits(reporter)
     for line in process_lines(reporter.facts):
         reporter.say(line)
     reporter.say(f"The recording is {escape(str(folder.recording))}; open it in a browser")
@@ -169,9 +169,15 @@ def _record(
     reporter.say(f"All results are in {escape(str(folder.path))}")
 
 
-def _warn_of_unknown_limits(reporter: Reporter) -> None:
-    """Say of which bases and joints no limit of speed is known; nobody may care how fast these turn."""
+def _warn_of_limits(reporter: Reporter) -> None:
+    """Say which limits were exceeded, and of which bases and joints no limit of speed is known.
+
+    Nobody may care how fast bases turn.
+    """
     speeds = reporter.facts["peak_speeds"]
+    if over := beyond_limits(reporter.facts):
+        said = escape("; ".join(over))
+        reporter.say(f"[yellow]Limits were exceeded: {said}; `verify` refuses the log where speeds were[/]")
     unknown = [s["name"] for s in speeds if s["limit"] is None and not s["name"].startswith("turn rate")]
     if unknown:
         names = escape(", ".join(unknown))

@@ -14,7 +14,7 @@ from coop_drake.cli.results import ResultFolder
 from coop_drake.cli.run import carry_out, simulation_of
 from coop_drake.cli.summary import plan_facts
 from coop_drake.cli.task import Task, read_task
-from coop_drake.errors import RefusalError
+from coop_drake.errors import PlanError, RefusalError
 from coop_drake.viz.drawing_processes import DrawingProcesses
 
 if TYPE_CHECKING:
@@ -67,6 +67,9 @@ def read_plan(task: Task, path: Path, reporter: Reporter, *, new_gains: bool = F
 
     found = load_plan(path)
     check_plan_belongs(found, task.problem, path)
+    if new_gains and found.motion is not None:
+        allowed = "the plan of a team that rests in every cell, as `plan --gains` makes it, beside --gains"
+        raise PlanError(f"{path}: its team passes from cell to cell; expected {allowed}")
     if new_gains:  # Also under the same name: a file may hold other gains than those of the plan.
         name = task.scenario.selected_gains
         found = reschedule(found, task.scenario.gain_sets[name], name)

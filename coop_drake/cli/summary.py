@@ -32,7 +32,7 @@ _ROWS = (
         "nearest to a limit of force",
         "{force_of}, {force_n:.1f} N, limit {force_limit_n:.1f} ({force_by})",
     ),
-    ("nearest to a limit of speed", "{nearest_to_a_limit}"),
+    ("nearest to a limit of motion", "{nearest_to_a_limit}"),
     ("error at the end", "{final_position_error_m:.4f} m, {final_angle_error_rad:.4f} rad"),
     ("used of the plan's budget", "{budget_used:.0%}: {budget_used_by} at {budget_used_at:.2f} s"),
 )
@@ -90,6 +90,12 @@ def summary_rows(facts: Mapping[str, Any], *, verbose: bool = False) -> list[tup
 def _beside_limit(speed: Mapping[str, Any]) -> str:
     limit = "no limit known" if speed["limit"] is None else f"limit {speed['limit']:g}"
     return f"{speed['peak']:.2f} {speed['unit']}, {limit}"
+
+
+def beyond_limits(facts: Mapping[str, Any]) -> list[str]:
+    """Return each speed, acceleration or effort of a run that exceeded its limit, beside this limit."""
+    over = [one for one in facts["peak_speeds"] if one["limit"] and one["peak"] > one["limit"]]
+    return [f"{one['name']}, {one['peak']:.6g} {one['unit']}, limit {one['limit']:g}" for one in over]
 
 
 def process_lines(facts: Mapping[str, Any]) -> list[str]:

@@ -80,6 +80,7 @@ def tune_command(
     The best gain set is written as gains.yaml, which run, plan and simulate take with --gains. Ctrl-C ends
     the search with the best so far.
     """
+    from coop_drake.scenario.model import SCHEDULED
     from coop_drake.tuning import (
         Limit,
         Objective,
@@ -96,8 +97,10 @@ def tune_command(
     wanted = criteria or ["peak_force"], ["time<=1x"] if limits is None else limits
     weights, kept = read_weights(wanted[0]), tuple(map(Limit.parse, wanted[1]))
     task = read_task(scenario, gains, reporter)
-    if task.scenario.planner.hand_over == "pass":
-        raise typer.BadParameter("tune varies the gains of a team with planner.hand_over: rest.")
+    if (
+        task.scenario.passes
+    ):  # Its motion has no gain set to tune; that of a team that rests in every cell has.
+        task = read_task(scenario, SCHEDULED, reporter)
     start = task.scenario.gain_sets[task.scenario.selected_gains]
     parameters = tunable_parameters(start, vary or ())
     folder = ResultFolder.of(task.name, out, "plan", "tuning", below=_TUNED)

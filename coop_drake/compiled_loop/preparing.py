@@ -84,7 +84,7 @@ def prepare(scenario: Scenario, plan: Plan, maps: Sequence[HarmonicMap]) -> Comp
         ScenarioError: The models do not make a team, or the compiled loop does not know what the scenario
             wants.
     """
-    _check(scenario)
+    _check(scenario, passes=plan.motion is not None)
     exact = replace(scenario, deployment=replace(scenario.deployment, mass_error=0.0))
     team = build_team_plant(scenario, DiagramBuilder())
     knowledge = robot_knowledge(exact, plan, maps, team)
@@ -118,9 +118,9 @@ def _axes(joints: Sequence[slice]) -> IntArray:
     return np.array([i for own in joints for i in (0, *range(1 + own.start, 1 + own.stop))])
 
 
-def _check(scenario: Scenario) -> None:
+def _check(scenario: Scenario, *, passes: bool) -> None:
     """Refuse what does not change from run to run and the loop does not know."""
-    control, passes = scenario.control, scenario.planner.hand_over == "pass"
+    control = scenario.control
     for key, found, allowed in (
         ("plant.grasps", scenario.plant.grasps if not scenario.plant.ideal else None, "joints"),
         ("control.predictor", control.predictor or None, "false"),

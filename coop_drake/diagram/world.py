@@ -112,7 +112,7 @@ def build_world(scenario: Scenario, plan: Plan, exchange: Exchange) -> World:
     link = builder.AddNamedSystem("team_link", TeamLink(joints, period, exchange, size))
     bodies = []
     for k, robot in enumerate(team.robots):
-        passes = scenario.planner.hand_over == "pass"
+        passes = plan.motion is not None
         body = build_body(scenario.deployment, k, robot.name, joints[k], passes=passes)
         diagram = builder.AddNamedSystem(f"robot_{k}_body", body.diagram)
         for output, receiver in (

@@ -96,7 +96,7 @@ def quickest_plan(
         raise StallError(f"{error} (these lengths are to be multiplied by {unit:g})") from error
     # Gains have bounds in metres: a team of another size moves at another pace than in its usual unit.
     plan = with_gains(scale.plan(made), gain_set, gain_set_name)
-    if problem.settings.hand_over == "rest":
+    if not problem.passes:
         plan = keep_limits(problem, timed(plan), gain_set)
     return replace(plan, problem=problem_digest(problem))
 
@@ -223,23 +223,22 @@ def cover_path(
     goals = np.array(final_intervals(problem, goal_values(problem, angle, path[-1, 2:])))
     limits = np.full(len(problem.start) - 1, np.inf) if limits is None else limits
     room = np.zeros(len(problem.start) - 1) if room is None else room
-    passing = problem.settings.hand_over == "pass"
     # At a small margin some levels are equal; each is tried once.
     for least_clearance, pads in dict.fromkeys(
         (max(fraction * margin, LEAST_CLEARANCE), pads) for fraction, pads in LEVELS
     ):
         least, narrowest = least_clearance + float(room[0]), pads[0] + float(room[1:].max())
-        points = _waypoints(boxes, grid, path, least, narrowest, PASSING_SHARE if passing else 1.0)
+        points = _waypoints(boxes, grid, path, least, narrowest, PASSING_SHARE if problem.passes else 1.0)
         if points is None:
             continue
-        if passing:
+        if problem.passes:
             steps = times_at_limits(team_chains(problem), motion_limits(problem.limits), points)
         else:
             steps = np.hypot(*np.diff(points[:, :2], axis=0).T)
         places = np.concatenate([[0.0], np.cumsum(steps)])
         waypoints = Waypoints(
             boxes, grid, points, places, np.array(pads), goals, schedule_of(gain_set), limits,
-            least, passing, room[1:],
+            least, problem.passes, room[1:],
         )  # fmt: skip
         rows, margin = choose_boxes(waypoints), CORE_FRACTION * least_clearance
         regions = Regions(problem, swept, margin)

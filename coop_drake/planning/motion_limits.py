@@ -11,18 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from coop_drake.answers.motion import (
-    BASE_ACCELERATION,
-    BASE_JERK,
-    BASE_SPEED,
-    FRICTION,
-    GRAVITY,
-    JOINT_ACCELERATION,
-    JOINT_RATE,
-    OBJECT_ACCELERATION,
-    TURN_ACCELERATION,
-    TURN_RATE,
-)
+from coop_drake.answers.motion import GRAVITY
 from coop_drake.answers.problem import PlanningProblem, TeamLimits
 from coop_drake.jit import compiled
 from coop_drake.laws.motion import motion_at
@@ -58,24 +47,18 @@ def motion_limits(limits: TeamLimits) -> FloatArray:
     """Return the largest velocity, acceleration and jerk of what ``follow`` knows, shape (P, 3).
 
     Args:
-        limits: What models and scenario state; where they state nothing, those of ``answers/motion`` count.
+        limits: What models and scenario state; where they state nothing, usual ones count.
     """
-    robots, joints = len(limits.base_components), len(limits.joint_rates)
-    rows = [
-        (1, None, (limits.object_acceleration, OBJECT_ACCELERATION), None),
-        (
-            robots,
-            (limits.base_speeds, BASE_SPEED),
-            (limits.base_accelerations, BASE_ACCELERATION),
-            (limits.base_jerks, BASE_JERK),
-        ),
-        (robots, (limits.turn_rates, TURN_RATE), (limits.turn_accelerations, TURN_ACCELERATION), None),
-        (joints, (limits.joint_rates, JOINT_RATE), (limits.joint_accelerations, JOINT_ACCELERATION), None),
+    kept = limits.with_defaults()
+    forces, none = largest_forces(limits), np.full(len(limits.base_components), inf)
+    rows: list[tuple[FloatArray, ...]] = [
+        (np.array([inf]), kept.object_acceleration, np.array([inf])),
+        (kept.base_speeds, kept.base_accelerations, kept.base_jerks),
+        (kept.turn_rates, kept.turn_accelerations, none),
+        (kept.joint_rates, kept.joint_accelerations, np.full(len(kept.joint_rates), inf)),
+        (none[: len(forces)], forces / _masses(limits), none[: len(forces)]),
     ]
-    found = [np.column_stack([_known(count, kind) for kind in kinds]) for count, *kinds in rows]
-    forces = largest_forces(limits)
-    none = np.full(len(forces), inf)
-    return np.concatenate([*found, np.column_stack([none, forces / _masses(limits), none])])
+    return np.concatenate([np.column_stack(columns) for columns in rows])
 
 
 def largest_forces(limits: TeamLimits) -> FloatArray:
@@ -83,9 +66,9 @@ def largest_forces(limits: TeamLimits) -> FloatArray:
 
     Empty where masses are not known.
     """
-    masses = _masses(limits)
-    by_friction = GRAVITY * masses * _known(len(masses), (limits.frictions, FRICTION))
-    return np.minimum(by_friction, _known(len(masses), (limits.base_forces, inf)))
+    masses, kept = _masses(limits), limits.with_defaults()
+    bases = slice(len(masses))
+    return np.minimum(GRAVITY * masses * kept.frictions[bases], kept.base_forces[bases])
 
 
 def _masses(limits: TeamLimits) -> FloatArray:
@@ -98,14 +81,6 @@ def _moved(bodies: Bodies, robots: int) -> list[list[tuple[float, ...]]]:
     """Return what each robot's base moves, none where nothing is known."""
     found = [[body for body in bodies if body[5] == robot] for robot in range(robots)]
     return found if all(found) else []
-
-
-def _known(count: int, limit: tuple[FloatArray, float] | None) -> FloatArray:
-    """Return what is stated of a kind of limit, and what counts otherwise; infinity for none, (count,)."""
-    if limit is None:
-        return np.full(count, inf)
-    stated, otherwise = limit
-    return np.where(np.isfinite(stated), stated, otherwise) if stated.size else np.full(count, otherwise)
 
 
 _Link = tuple[FloatArray, float, FloatArray, int, FloatArray]

@@ -72,7 +72,7 @@ def plan(
         problem: What is asked.
         gain_set: Gains, fixed or to be scheduled.
         gain_set_name: Name under which the scenario knows them.
-        budget: Departures from the ideal team that the plan shall tolerate; only with ``hand_over: pass``.
+        budget: Departures from the ideal team that the plan shall tolerate; only of a team that passes.
         effort: As ``PlannerSettings`` has it, in place of that of the problem.
         progress: Called with a phase and the fraction of it that is done. If it raises PatienceError, a plan
             is finished along the way that is certified by then; without one, the error goes to the caller.
@@ -88,10 +88,10 @@ def plan(
         if not 0.0 <= effort < inf:
             raise ValueError(f"effort is {effort}; allowed are numbers of 0 or more")
         problem = replace(problem, settings=replace(problem.settings, effort=effort))
-    if problem.settings.hand_over == "pass" and not problem.limits.base_components:
-        raise ValueError("hand_over: pass needs limits.base_components")
-    if problem.settings.hand_over == "rest" and budget is not None:
-        raise ValueError("a budget needs hand_over: pass")
+    if problem.passes and not problem.limits.base_components:
+        raise ValueError("a team that passes from cell to cell needs limits.base_components")
+    if not problem.passes and budget is not None:
+        raise ValueError("a budget needs a team that passes from cell to cell")
     # Floors are remembered by question, and the caller may change the arrays of a question between two calls.
     problem = replace(problem, start=problem.start.copy(), goal_pose=problem.goal_pose.copy())
     local, near = local_question(problem), None
@@ -168,7 +168,7 @@ def _without_limits(
     problem: PlanningProblem, found: Channel | CoveredPath, gain_set: GainSet, name: str, *, slowly: bool
 ) -> Plan | None:
     """A plan for a team that rests in every cell, without limits, and the limits that refuse it, if any."""
-    problem, factor = replace(problem, settings=replace(problem.settings, hand_over="rest")), 1.0
+    problem, factor = replace(problem, passes=False), 1.0
     if slowly and isinstance(gain_set, ScheduledGains):
         factor, gain_set = AGE_FACTORS[-1], gain_set.slowed(AGE_FACTORS[-1])
     asked = ended(problem, found)
@@ -220,7 +220,7 @@ def _made(
     found: Channel | CoveredPath,
     progress: Progress | None = None,
 ) -> Plan | BeyondBudget:
-    if problem.settings.hand_over == "pass":
+    if problem.passes:
         return _passing(problem, found, gain_set, name, budget, progress)
     return _slow_enough(problem, found, gain_set, name, progress)
 
@@ -254,7 +254,7 @@ def _passing(
         except (PlanError, np.linalg.LinAlgError) as error:
             raise StallError(
                 f"no motion through its cells without a stop was found: {error}; "
-                "with planner.hand_over: rest, the plan is returned"
+                "there is a plan for a team that rests in every cell (--gains scheduled)"
             ) from error
         made = replace(made, motion=motion)
     assert made.motion is not None  # by both ways

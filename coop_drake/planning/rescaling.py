@@ -59,6 +59,7 @@ class Rescaling:
             joint_tolerance=problem.joint_tolerance * units[3:],
             settings=_settings(problem.settings, scale),
             limits=TeamLimits(),
+            passes=False,  # Limits have units; boxes are chosen without them.
         )
 
     def answer(self, found: CoveredPath | Channel | NoChannel) -> CoveredPath | Channel | NoChannel:
@@ -209,7 +210,6 @@ def _settings(settings: PlannerSettings, scale: float) -> PlannerSettings:
         margin=margin,
         length_resolution=scale * settings.length_resolution,
         min_clearance=settings.min_clearance,  # It is meant for the usual size.
-        hand_over="rest",  # Its limits have units; boxes are chosen without them.
     )
 
 

@@ -221,7 +221,7 @@ def make_plan(
         gain_set=gain_set_name,
         problem=problem_digest(problem),
     )
-    if problem.settings.hand_over == "pass":  # The motion through the cells keeps the limits, and takes time.
+    if problem.passes:  # The motion through the cells keeps the limits, and takes time.
         return made
     return _checked(problem, keep_limits(problem, timed(made), gain_set), routes)
 

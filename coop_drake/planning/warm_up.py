@@ -52,7 +52,7 @@ def main() -> None:
         (None,),
         settings=PlannerSettings(margin=0.1),
     )
-    passing = replace(question, settings=replace(question.settings, hand_over="pass"), limits=LIMITS)
+    passing = replace(question, passes=True, limits=LIMITS)
     for asked, budget in ((question, None), (passing, None), (passing, BUDGET)):
         plan(asked, ScheduledGains(), gain_set_name="scheduled", budget=budget)
     Proofs(question).run(SLICES)

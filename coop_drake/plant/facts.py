@@ -265,9 +265,9 @@ def budget_of(choice: str | None, scenario: Scenario, problem: PlanningProblem) 
     required = scenario.deployment.budget
     if choice is None and required == "none":
         return None
-    if scenario.planner.hand_over != "pass":
-        allowed = "pass: budgets hold for teams that pass from cell to cell"
-        raise ScenarioError(str(scenario.path), "planner.hand_over", "rest", allowed)
+    if not scenario.passes:
+        allowed = "null: budgets hold for teams that pass from cell to cell"
+        raise ScenarioError(str(scenario.path), "gains.selected", scenario.gains.selected, allowed)
     choice, masses = choice or required, _of_models(scenario)
     budget = read_budget(choice, scenario, problem.tree, masses)
     if wrong := wrong_facts(budget, _facts(scenario, masses)):

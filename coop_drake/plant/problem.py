@@ -200,6 +200,7 @@ def stated_problem(
         joint_tolerance=goal.tolerances.joint,
         settings=scenario.planner,
         limits=_stated_limits(scenario, joints, limits),
+        passes=scenario.passes,
     )
 
 

@@ -47,18 +47,22 @@ def validate(scenario: Scenario) -> None:
 
 
 def _setting_faults(scenario: Scenario) -> Faults:
-    if scenario.gains.selected not in scenario.gains.sets:
-        known = ", ".join(sorted(scenario.gains.sets))
-        yield "gains.selected", scenario.gains.selected, f"a gain set, one of {known}"
-    passes = scenario.planner.hand_over == "pass"
+    passes, known = scenario.passes, ", ".join(sorted(scenario.gains.sets))
+    if not passes and scenario.gains.selected not in scenario.gains.sets:
+        allowed = f"a gain set, one of {known}; null for a team that passes from cell to cell"
+        yield "gains.selected", scenario.gains.selected, allowed
     if not passes and scenario.deployment.budget != "none":
-        allowed = "none; with planner.hand_over: pass a plan may have a budget"
+        allowed = "none; the plan of a team that passes from cell to cell (gains.selected: null) may have one"
         yield "deployment.budget", scenario.deployment.budget, allowed
     hold = scenario.control.hold
     if hold is not None and passes:
         for key in ("energy", "silence"):
             if (stated := getattr(hold, key)) is not None:
-                yield f"control.hold.{key}", stated, "null with planner.hand_over: pass"
+                yield (
+                    f"control.hold.{key}",
+                    stated,
+                    "null for a team that passes from cell to cell; with gains.selected it may be stated",
+                )
     if hold is not None and hold.silence is not None and scenario.deployment.control_rate is None:
         yield "control.hold.silence", hold.silence, "null without deployment.control_rate"
 

@@ -62,11 +62,12 @@ def dump_scenario(scenario: Scenario) -> str:
 
 
 def with_gains(scenario: Scenario, choice: str | None) -> Scenario:
-    """Return the scenario with a gain set selected.
+    """Return the scenario of a team that rests in every cell with a gain set.
 
     Args:
         scenario: The scenario.
-        choice: Name of one of its gain sets, or a file with a ``gains`` section; None leaves the selection.
+        choice: Name of one of its gain sets, or a file with a ``gains`` section; None for what
+            the scenario selects.
 
     Raises:
         ScenarioError: There is no such set and no such file, or the file is wrong.

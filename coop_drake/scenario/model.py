@@ -136,21 +136,27 @@ class Goal:
     tolerances: Tolerances = field(default_factory=Tolerances)
 
 
+SCHEDULED = "scheduled"
+"""The gain set that is derived from each cell."""
+
+
 @dataclass(frozen=True)
 class Gains:
-    """The gain sets, and which of them the run uses.
+    """The gain sets of teams that rest in every cell, and which of them the run uses.
 
     Attributes:
-        selected: Name of the set that the run uses.
+        selected: Name of the set of a team that rests in every cell before it enters the next one, as the
+            paper's does. Null for a team that passes from cell to cell without a stop: its motion has gains
+            of its own.
         sets: Sets by name; ``scheduled`` and ``table_2`` (the paper's) are always defined.
     """
 
-    selected: str = "scheduled"
+    selected: str | None = None
     sets: dict[str, GainSet] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         """Add the sets that are always defined."""
-        shipped = {"scheduled": ScheduledGains(), "table_2": FixedGains()}
+        shipped = {SCHEDULED: ScheduledGains(), "table_2": FixedGains()}
         object.__setattr__(self, "sets", shipped | self.sets)
 
 
@@ -235,8 +241,9 @@ class RobotLimits:
             all [rad/s or m/s].
         joint_accelerations: Largest accelerations of the joints, likewise [rad/s^2 or m/s^2].
         base_acceleration: Largest acceleration of the base's frame [m/s^2]. This key and the next two are
-            used only with ``hand_over: pass``. Null means 1 m/s^2, 2 rad/s^2 and 10 m/s^3; then, unknown
-            speeds of bases are 1 m/s and 1.5 rad/s, unknown limits of joints 1 rad/s and 2 rad/s^2.
+            used only by a team that passes from cell to cell. Null means 1 m/s^2, 2 rad/s^2 and 10 m/s^3;
+            then, unknown speeds of bases are 1 m/s and 1.5 rad/s, unknown limits of joints 1 rad/s and
+            2 rad/s^2.
         base_turn_acceleration: Largest acceleration of the base's angle [rad/s^2].
         base_jerk: Largest jerk of the base's frame [m/s^3].
         friction: Largest force of the base over the weight of base, arm and its share of the load, used as
@@ -417,5 +424,10 @@ class Scenario:
 
     @property
     def selected_gains(self) -> str:
-        """Name of the gain set that the run uses."""
-        return self.gains.selected
+        """Name of the gain set by which a plan is made."""
+        return self.gains.selected or SCHEDULED
+
+    @property
+    def passes(self) -> bool:
+        """Whether the team passes from cell to cell without a stop."""
+        return self.gains.selected is None

@@ -6,6 +6,7 @@ import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+from coop_drake.answers import motion
 from coop_drake.errors import ScenarioError
 
 _CLEARANCE = 0.5
@@ -19,9 +20,6 @@ _DOOR_CLEARANCE = 0.2
 
 _LENGTHS = 0.8, 1.4
 """Length of the object for up to four robots and for more, of which two stand at one side [m]."""
-
-_BASE_SPEED, _TURN_RATE = 1.0, 2.0
-"""Largest speed [m/s] and turn rate [rad/s] of the bases: those of usual mobile bases."""
 
 Pose = tuple[float, float, float]
 
@@ -131,8 +129,13 @@ def starter_text(starter: Starter) -> str:
         f"  object: {_pose(goal)}  # joints are free",
         "  tolerances: {position: 0.01, angle: 0.02}",
         "",
+        "# Those of usual mobile bases, in m/s, rad/s, m/s^2, rad/s^2, m/s^3; of the object in m/s^2.",
         "limits:",
-        f'  "*": {{base_speed: {_BASE_SPEED:g}, base_turn_rate: {_TURN_RATE:g}}}  # m/s, rad/s',
+        f'  "*": {{base_speed: {motion.BASE_SPEED:g}, base_turn_rate: {motion.TURN_RATE:g}, '
+        f"base_acceleration: {motion.BASE_ACCELERATION:g}, "
+        f"base_turn_acceleration: {motion.TURN_ACCELERATION:g}, base_jerk: {motion.BASE_JERK:g}, "
+        f"friction: {motion.FRICTION:g}}}",
+        f"  object: {{acceleration: {motion.OBJECT_ACCELERATION:g}}}",
     ]
     return "\n".join(lines) + "\n"
 

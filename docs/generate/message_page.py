@@ -80,8 +80,8 @@ most {MOST_ROBOTS}, {SUPERVISOR} for the supervisor and {WORLD} for the world.
 
 The world and the supervisor listen, each with a `ROUTER` socket at its address of the [address
 book](../how_to/apart.md#addresses-and-keys). Robots connect to both, the supervisor to the world, each with
-a `DEALER` socket, and with the CURVE keys of the book if there are any. In a team with `hand_over: pass`
-robots connect to all robots with larger indices, too.
+a `DEALER` socket, and with the CURVE keys of the book if there are any. In a team that passes from cell
+to cell, robots connect to all robots with larger indices, too.
 
 1. The process that connects draws a number for the session. It sends `Hello` with it every tenth of a second
    until the answer is `Welcome`. After `Refused` with a reason it may ask again.

@@ -34,7 +34,7 @@ from coop_drake.scenario.deployment import Wave, Waves
 from tests.support.scenarios import write_scenario
 
 ASKED = {
-    "set": {"deployment.preset": "mobile_base", "planner.hand_over": "pass"},
+    "set": {"deployment.preset": "mobile_base"},
     "budget": "all",
     "scenarios": ["room.scenario.yaml"],
 }
@@ -46,9 +46,7 @@ WAVES = "deployment.measurements.waves"
 def allowed(tmp_path_factory):
     """The departures that the whole budget of a preset allows, and the team."""
     file = tmp_path_factory.mktemp("room") / "room.scenario.yaml"
-    scenario = coop_drake.load_scenario(
-        write_scenario(file, deployment={"preset": "mobile_base"}, planner={"hand_over": "pass"})
-    )
+    scenario = coop_drake.load_scenario(write_scenario(file, deployment={"preset": "mobile_base"}))
     problem = planning_problem(scenario)
     return BoundedDepartures(budget_of("all", scenario, problem), problem.tree), problem.tree
 

@@ -66,7 +66,7 @@ def test_what_the_compiled_loop_does_not_know_is_no_lost_run(section, said, tmp_
 def test_a_plan_with_a_budget_is_not_followed_in_continuous_time(tmp_path):
     budget = tmp_path / "own.budget.yaml"
     budget.write_text("{}")
-    passing = {"planner.hand_over": "pass"}
+    passing = {"gains.selected": None}
     said = refused(tmp_path, runs={**ROOM, "count": 2, "budget": budget.name, "set": passing})
     assert "deployment.control_rate: None is not allowed" in said
 

@@ -194,7 +194,7 @@ def test_a_plan_of_other_sources_or_models_is_made_anew(tmp_path, monkeypatch):
 
 def test_an_edited_budget_asks_for_another_plan(tmp_path):
     write_scenario(tmp_path / "room.scenario.yaml")
-    passing = {"planner.hand_over": "pass"}
+    passing = {"gains.selected": None}
     asked = {"scenarios": ["room.scenario.yaml"], "budget": "own.budget.yaml", "set": passing}
     file, budget = tmp_path / "room.campaign.yaml", tmp_path / "own.budget.yaml"
     file.write_text(yaml.safe_dump({"runs": {**asked, "count": 1}}))

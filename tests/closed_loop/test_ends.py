@@ -15,7 +15,7 @@ from coop_drake.apart.messages import Place, Switch
 from coop_drake.chain import plan
 from coop_drake.diagram import build_station
 from coop_drake.diagram.robot_controller import robot_knowledge
-from coop_drake.scenario import load_scenario
+from coop_drake.scenario import load_scenario, with_gains
 from coop_drake.simulation import build_maps, run, simulate
 from tests.support.cli import invoke
 from tests.support.scenarios import write_scenario
@@ -25,7 +25,7 @@ from tests.support.small_scenario import small_scenario
 from tests.support.turret import write_turret
 
 SAMPLED = "deployment: {control_rate: 100}"
-BUDGET = "planner: {hand_over: pass}\ndeployment: {preset: mobile_base, budget: all}"
+BUDGET = "deployment: {preset: mobile_base, budget: all}"
 
 
 class Wrapping(DirectExchange):
@@ -48,9 +48,8 @@ class Wrapping(DirectExchange):
 @pytest.fixture(scope="module")
 def sampled(tmp_path_factory):
     """Scenario of a sampled team, its plan and maps; the joint begins four turns from where it ends."""
-    scenario = load_scenario(
-        write_turret(tmp_path_factory.mktemp("turret"), 3.0 + 8.0 * pi, -3.1, more=SAMPLED)
-    )
+    path = write_turret(tmp_path_factory.mktemp("turret"), 3.0 + 8.0 * pi, -3.1, more=SAMPLED)
+    scenario = with_gains(load_scenario(path), "scheduled")
     answer = plan(scenario)
     assert isinstance(answer, Found)
     return scenario, answer.plan, build_maps(answer.plan)

@@ -246,20 +246,6 @@ def test_words_that_are_later_than_the_motion_allows_are_refused() -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "key"),
-    [
-        ("planner: {hand_over: stop}", "planner.hand_over"),
-    ],
-)
-def test_scenarios_that_cannot_pass_are_refused_by_key(tmp_path, text, key) -> None:
-    shipped = load_scenario("warehouse").path.read_text()
-    path = tmp_path / "other.scenario.yaml"
-    path.write_text(f"{shipped}\n{text}\n")
-    with pytest.raises(ScenarioError, match=key):
-        load_scenario(path)
-
-
-@pytest.mark.parametrize(
     ("limits", "key"),
     [
         ({"*": RobotLimits(acceleration=1.0)}, r"limits\.\*\.acceleration"),

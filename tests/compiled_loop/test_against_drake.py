@@ -304,10 +304,10 @@ runs:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("hand_over", ["rest", "pass"])
-def test_both_tiers_leave_the_same_record(hand_over, tmp_path, monkeypatch):
+@pytest.mark.parametrize("gains", ["scheduled", "null"])
+def test_both_tiers_leave_the_same_record(gains, tmp_path, monkeypatch):
     path, prepared = tmp_path / "both.campaign.yaml", []
-    path.write_text(FILE.replace("set: {", f"set: {{planner.hand_over: {hand_over}, "))
+    path.write_text(FILE.replace("set: {", f"set: {{gains.selected: {gains}, "))
     variation = Variation(load_campaign(path))
     plans = Plans(variation, tmp_path)
     monkeypatch.setattr(preparing, "_check", prepared.append)

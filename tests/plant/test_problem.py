@@ -58,7 +58,7 @@ def test_joints_and_settings_go_through(tmp_path):
         ("robot_1: [0.0]", "robot_1: [-0.25]"),
         (GOAL, "object: {x: 5, y: 8, theta: 4.663}\n  joints: {robot_1: [-1.6]}"),
         ("angle: 0.02}", "angle: 0.05, joint: 0.1}"),
-        ("gains:", "planner: {margin: 0.02}\ngains:"),
+        ("object: object\n", "object: object\nplanner: {margin: 0.02}\n"),
     )
     problem = problem_of(load_scenario(path))
     assert problem.start == pytest.approx([0.9, 2.0, 1.57, 0.0, -0.25])
@@ -132,8 +132,8 @@ def test_nonsense_is_refused_with_its_key_and_what_is_allowed(pair, key, allowed
     assert caught.value.key == key
 
 
-STATED = '\nlimits:\n  "*": {base_speed: 7, base_turn_rate: 8}'
-"""What the shipped scenario says."""
+STATED = "angle: 0.02}\n"
+"""Where the shipped scenario ends."""
 
 
 def arm(*more):
@@ -159,12 +159,24 @@ def limits_of(path):
 def test_the_scenario_replaces_what_models_say(said, rates, tmp_path):
     path = write_with_robot(
         tmp_path, arm(limit(0.7), limit(0.6)).text(), "sdf", ("robot_0: [0.0]", "robot_0: [0.0, 0.0]"),
-        (STATED, f"\nlimits: {{robot_0: {said}, '*': {{base_speed: 2}}}}"),
+        (STATED, f"{STATED}limits: {{robot_0: {said}, '*': {{base_speed: 2}}}}"),
     )  # fmt: skip
     limits = limits_of(path)
     assert limits.joint_rates.tolist()[:2] == rates
     assert limits.base_speeds.tolist() == [0.5 if "speed" in said else np.inf, 2.0]
     assert limits.turn_rates.tolist() == [0.8 if "turn" in said else np.inf, np.inf]
+
+
+def test_usual_limits_count_for_a_team_that_passes_where_nothing_is_stated():
+    """Joints of the shipped models have a limit of their rates, 5 rad/s."""
+    problem = planning_problem(shipped("base"))
+    kept, resting = problem.kept_limits, replace(problem, passes=False).kept_limits
+    assert [kept.base_speeds.tolist(), kept.turn_rates.tolist()] == [[1.0, 1.0], [1.5, 1.5]]
+    assert [kept.base_accelerations.tolist(), kept.turn_accelerations.tolist()] == [[1.0, 1.0], [2.0, 2.0]]
+    assert [kept.base_jerks.tolist(), kept.frictions.tolist()] == [[10.0, 10.0], [0.5, 0.5]]
+    assert [kept.joint_rates.tolist(), kept.joint_accelerations.tolist()] == [[5.0, 5.0], [2.0, 2.0]]
+    assert kept.object_acceleration.tolist() == [1.5]
+    assert not np.isfinite(resting.base_speeds).any()
 
 
 @pytest.mark.parametrize("velocity", ["0", "nan"])
@@ -195,22 +207,24 @@ def test_a_negative_limit_of_urdf_is_refused_before_drake_ends_the_process(tmp_p
     ],
 )
 def test_impossible_limits_of_a_scenario_are_refused(said, key, allowed, tmp_path):
-    check_refusal(tmp_path, (STATED, f"\nlimits: {said}"), key, ..., allowed)
+    check_refusal(tmp_path, (STATED, f"{STATED}limits: {said}"), key, ..., allowed)
 
 
 def test_as_many_limits_as_joints_are_expected(tmp_path):
     for key in ("joint_rates", "joint_accelerations"):
-        path = write_edited(tmp_path, (STATED, f'\nlimits: {{"*": {{{key}: [1, 2]}}}}'))
+        path = write_edited(tmp_path, (STATED, f'{STATED}limits: {{"*": {{{key}: [1, 2]}}}}'))
         with pytest.raises(ScenarioError, match=rf"limits\.\*\.{key}: .* a list of 1, for robot_0::"):
             planning_problem(load_scenario(path))
 
 
 def test_limits_change_the_question(tmp_path):
-    stated = '\nlimits: {"*": {base_speed: 0.5, joint_accelerations: [3]}}'
-    path = write_edited(tmp_path, (STATED, stated))
+    stated = 'limits: {"*": {base_speed: 0.5, joint_accelerations: [3]}}'
+    path = write_edited(tmp_path, (STATED, STATED + stated))
     digests = {problem_digest(planning_problem(load_scenario(path)))}
-    for less in ("", '\nlimits: {"*": {base_speed: 0.5}}'):
-        digests.add(problem_digest(planning_problem(load_scenario(write_edited(tmp_path, (STATED, less))))))
+    for less in ("", 'limits: {"*": {base_speed: 0.5}}'):
+        digests.add(
+            problem_digest(planning_problem(load_scenario(write_edited(tmp_path, (STATED, STATED + less)))))
+        )
     assert len(digests) == 3
 
 
@@ -261,7 +275,7 @@ def test_limits_of_models_are_read_and_those_without_are_unknown(text, ending, j
     start = "robot_0: [0.0]", f"robot_0: {[0.0, 0.1, 0.0][:joints]}"
     path = write_with_robot(
         tmp_path, text, ending, start, ("y: 2,", "y: 1.8,"),
-        (STATED, "\nlimits: {robot_1: {joint_accelerations: [4]}}"),
+        (STATED, f"{STATED}limits: {{robot_1: {{joint_accelerations: [4]}}}}"),
     )  # fmt: skip
     limits = limits_of(path)
     for name, values in expected.items():

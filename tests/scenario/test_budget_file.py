@@ -29,8 +29,7 @@ GOAL = {"object": {"x": 3.5, "y": 2.0, "theta": 0.0}, "tolerances": {"position":
 
 
 def scenario(folder, **deployment):
-    file, passing = folder / "room.scenario.yaml", {"hand_over": "pass"}
-    return write_scenario(file, goal=GOAL, planner=passing, deployment={**PRESET, **deployment})
+    return write_scenario(folder / "room.scenario.yaml", goal=GOAL, deployment={**PRESET, **deployment})
 
 
 def test_the_budget_of_a_preset(tmp_path):

@@ -22,6 +22,7 @@ from coop_drake.scenario import (
     load_scenario,
     with_gains,
 )
+from coop_drake.scenario.document import parse, write
 from coop_drake.typed_data import convert_class
 from tests.support.cases import CASES, case
 from tests.support.edited_scenario import shipped, write_edited
@@ -55,7 +56,7 @@ def test_shipped_scenarios_are_the_cases_with_both_gain_sets(name):
     goal = scenario.goal.object
     assert (goal.x, goal.y, goal.theta) == tuple(expected.goal_pose)
     assert scenario.goal.joints == {}
-    assert scenario.selected_gains == "scheduled"
+    assert scenario.passes
     assert scenario.gain_sets == {"scheduled": ScheduledGains(), "table_2": FixedGains()}
 
 
@@ -88,14 +89,14 @@ def test_written_scenario_reads_back_to_the_same(name, tmp_path):
 def test_settings_of_every_section_are_read(tmp_path):
     path = write_edited(
         tmp_path,
-        ("  selected: scheduled", "  selected: gentle"),
         (
-            "gains:",
+            "object: object\n",
+            "object: object\n"
             "planner: {margin: 0.05, max_slices: 77, strategy: paper}\n"
             "simulator: {max_time: 12, integration_scheme: runge_kutta2}\n"
-            "visualization: {wall_height: 1, show_collision: true}\ngains:",
+            "visualization: {wall_height: 1, show_collision: true}\n"
+            "gains: {selected: gentle, sets: {gentle: !ScheduledGains {age_phase: 0.5}}}\n",
         ),
-        ("the paper's", "the paper's\n  sets: {gentle: !ScheduledGains {age_phase: 0.5}}"),
         ("angle: 0.02}", "angle: 0.03}\n  joints: {robot_1: [null]}"),
     )
     scenario = load_scenario(path)
@@ -110,7 +111,8 @@ def test_settings_of_every_section_are_read(tmp_path):
 
 
 def test_part_of_a_shipped_gain_set_can_be_changed(tmp_path):
-    path = write_edited(tmp_path, ("the paper's", "x\n  sets: {table_2: !FixedGains {damping: 9.0}}"))
+    gains = "gains: {sets: {table_2: !FixedGains {damping: 9.0}}}\n"
+    path = write_edited(tmp_path, ("object: object\n", f"object: object\n{gains}"))
     assert load_scenario(path).gain_sets["table_2"] == FixedGains(damping=9.0)
 
 
@@ -197,6 +199,12 @@ def test_what_is_dumped_is_read_back_and_selected(tmp_path, gains):
     assert scenario.selected_gains == "mine"
     assert scenario.gain_sets["mine"] == gains
     assert {"scheduled", "table_2"} < set(scenario.gain_sets)
+
+
+@pytest.mark.parametrize("text", ["0e6jek&ou7", "1e3", "12_0e+4", "-2e5x", "1.5"])
+def test_texts_that_begin_like_numbers_are_read_back_as_texts(text):
+    assert parse(write({"key": text, text: 2.0})) == {"key": text, text: 2.0}
+    assert parse("[1e3, 0e6jek, -2e5x]") == [1000.0, "0e6jek", "-2e5x"]
 
 
 def test_the_file_is_a_section_of_a_scenario(tmp_path):

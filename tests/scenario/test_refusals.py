@@ -23,14 +23,21 @@ def corners(first):
     return CORNERS, f"{first}, [1.8, 0], [1.8, 3.6]"
 
 
+END = "angle: 0.02}\n"
+
+
+def gains(text):
+    return END, f"{END}gains: {text}\n"
+
+
 def sets(text):
-    return "the paper's", f"x\n  sets: {text}"
+    return gains(f"{{sets: {text}}}")
 
 
 @pytest.mark.parametrize(
     ("edit", "key", "value", "allowed"),
     [
-        (("gains:", "gain:"), "gain", {"selected": "scheduled"}, "one of the keys workspace"),
+        ((END, f"{END}gain: {{selected: fast}}"), "gain", {"selected": "fast"}, "one of the keys workspace"),
         (("object: object\n\nstart:", "object: object\n\nbegin:"), "begin", ..., "one of the keys"),
         (("  joints:", "  joint:"), "start.joint", ..., "one of the keys object, joints"),
         (start("x: 0.9, y: 2, theta: 1.57, z: 1"), "start.object.z", 1, "one of the keys x, y, theta"),
@@ -42,7 +49,7 @@ def sets(text):
         (("robot_0: [0.0]", "1: [0.0]"), "start.joints.1", 1, "a text as the name"),
         (corners("[0, 0, 0]"), "workspace.outer[0]", [0, 0, 0], "a list of 2"),
         (corners("[1.0e+12, 0]"), "workspace.outer[0][0]", 1e12, "between -1e+06 and"),
-        (("selected: scheduled", "selected: fast"), "gains.selected", "fast", "one of scheduled, table_2"),
+        (gains("{selected: fast}"), "gains.selected", "fast", "one of scheduled, table_2"),
         (sets("{mine: !Gains {}}"), "gains.sets.mine", "!Gains", "one of !FixedGains, !ScheduledGains"),
         (sets("{scheduled: {age_phase: 0.5}}"), "gains.sets.scheduled", {"age_phase": 0.5}, "one of !Fixed"),
         (sets("{mine: !FixedGains {stifness: 3}}"), "gains.sets.mine.stifness", 3, "the keys stiffness"),
@@ -61,7 +68,11 @@ def test_a_wrong_value_is_refused_with_its_key_and_what_is_allowed(edit, key, va
         ("{load_shares: {robot_0: -0.5, robot_1: 1.5}}", "load_shares.robot_0", "between 0 and 1"),
         ("{limits: {nobody: {base_speed: 1.0}}}", "limits.nobody", "a robot, one of robot_0, robot_1"),
         ("{simulator: {integration_scheme: euler}}", "simulator.integration_scheme", "one of runge_kutta3"),
-        ("{control: {hold: {silence: 0.1}}}", "control.hold.silence", "without deployment.control_rate"),
+        (
+            "{gains: {selected: scheduled}\ncontrol: {hold: {silence: 0.1}}}",
+            "control.hold.silence",
+            "without deployment.control_rate",
+        ),
         ("{deployment: {control_rate: 0.5}}", "deployment.control_rate", "between 1 and 10000, or null"),
         (
             "{deployment: {actuators: {base_force: 0}}}",
@@ -278,7 +289,7 @@ def test_sense_closing_corner_and_straight_corners_do_not_matter(outer, tmp_path
 
 def test_all_faults_of_a_file_are_said_at_once(tmp_path):
     """Those of single values first, then those of values that do not fit together."""
-    path = write_edited(tmp_path, ("selected: scheduled", "selectd: scheduled"), ("angle: 0.02", "angle: -1"))
+    path = write_edited(tmp_path, gains("{selectd: scheduled}"), ("angle: 0.02", "angle: -1"))
     with pytest.raises(ScenarioError) as caught:
         load_scenario(path)
     lines = str(caught.value).splitlines()
@@ -286,7 +297,7 @@ def test_all_faults_of_a_file_are_said_at_once(tmp_path):
     assert lines[0].endswith("did you mean selected?")
     assert lines[1] == (f"{path}: goal.tolerances.angle: -1 is not allowed; expected a positive number")
     unfit = "load_shares: {robot_7: 1.0}\ndeployment: {clock_error: 0.1}\n"
-    path = write_edited(tmp_path, ("selected: scheduled", "selected: fast"), ("object: object\n", unfit))
+    path = write_edited(tmp_path, gains("{selected: fast}"), ("object: object\n", unfit))
     with pytest.raises(ScenarioError) as caught:
         load_scenario(path)
     others = {"load_shares.robot_7", "load_shares.robot_0", "load_shares.robot_1", "deployment.clock_error"}

@@ -28,7 +28,7 @@ WIDER = {"*": RobotLimits(1.1, 1.1, (1.1,), (2.2,))}
 
 def passing(scenario: Scenario) -> Scenario:
     """The scenario of a team that passes from cell to cell, within limits of speeds and joints."""
-    return replace(scenario, planner=replace(scenario.planner, hand_over="pass"), limits=LIMITS)
+    return replace(scenario, gains=replace(scenario.gains, selected=None), limits=LIMITS)
 
 
 @cache

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import yaml
+
+from coop_drake.scenario import Scenario, with_gains
+from coop_drake.scenario.model import RobotLimits
 
 ROOT = Path(__file__).parents[2]
 MODELS = ROOT / "models"
@@ -31,6 +35,12 @@ TWO_ROOMS = {
     "goal": {"object": {"x": 7.5, "y": 2.0, "theta": 1.5}},
 }  # fmt: skip
 """Sections with a door through which the team goes without turning: it turns before and behind it."""
+
+
+def resting(scenario: Scenario) -> Scenario:
+    """The scenario of a team that rests in every cell, with limits of bases that it hardly reaches."""
+    limits = scenario.limits or {"*": RobotLimits(7.0, 8.0)}
+    return with_gains(replace(scenario, limits=limits), "scheduled")
 
 
 def write_scenario(path: Path, **sections: object) -> Path:

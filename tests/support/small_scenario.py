@@ -8,6 +8,7 @@ from pathlib import Path
 from shapely import Polygon
 
 from coop_drake.scenario import Goal, ObjectPose, Scenario, Start, Tolerances, Workspace, load_scenario
+from tests.support.scenarios import resting
 from tests.support.small_plan import ANGLE_TOLERANCE, GOAL_POSE, POSITION_TOLERANCE, ROOM, START_POSE
 
 MODELS = Path(__file__).parents[2] / "models"
@@ -15,7 +16,7 @@ MODELS = Path(__file__).parents[2] / "models"
 
 def small_scenario(team: str = "base", workspace: Polygon = ROOM) -> Scenario:
     """The team of a shipped scenario (base, elbow, three) in the open room, or on another floor."""
-    return in_open_room(load_scenario(MODELS / f"{team}.scenario.yaml"), workspace)
+    return in_open_room(resting(load_scenario(MODELS / f"{team}.scenario.yaml")), workspace)
 
 
 def in_open_room(scenario: Scenario, workspace: Polygon = ROOM) -> Scenario:

@@ -35,7 +35,7 @@ from coop_drake.verification import verify_plan
 from coop_drake.verification.budget_origin import check_origin
 from tests.support.certificates import GAINS, room_with_pillar
 from tests.support.motions import planned_motion, planned_under_budget, required_budget
-from tests.support.scenarios import MODELS
+from tests.support.scenarios import MODELS, resting
 from tests.support.small_scenario import small_scenario
 
 
@@ -120,7 +120,7 @@ class Case(NamedTuple):
 @cache
 def case(name):
     """The last cells of a shipped scenario's plan."""
-    scenario = load_scenario(MODELS / f"{name}.scenario.yaml")
+    scenario = resting(load_scenario(MODELS / f"{name}.scenario.yaml"))
     problem, gains = planning_problem(scenario), scenario.gain_sets
     found = make(problem, gains["scheduled"], gain_set_name="scheduled").plan
     plan, asked = last_cells(found, problem, CELLS)

@@ -378,8 +378,8 @@ def _base(rows: Rows, robot: int) -> FloatArray:
 
 
 def check_run_speeds(rows: Rows, problem: PlanningProblem) -> Check | None:
-    """Check every measured speed against its limit; None where there is none."""
-    limits = problem.limits
+    """Check every measured speed against its limit, stated or usual; None where there is none."""
+    limits = problem.limits if rows.plan.motion is None else problem.limits.with_defaults()
     if not limits.any:
         return None
     speeds, rates = np.empty(rows.log.base_poses.shape[:2]), np.empty(rows.log.base_poses.shape[:2])
