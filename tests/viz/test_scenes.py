@@ -2,6 +2,7 @@
 
 import base64
 import dataclasses
+import gc
 import json
 import logging
 import re
@@ -147,6 +148,7 @@ FACTS = {"processes": PROCESSES, "stops": [STOP | {"resumed": 3.0}, STOP]}
 
 @pytest.fixture(scope="module")
 def served():
+    gc.collect()  # Meshcat may end only where it was made: threads of servers must not find old ones.
     meshcat = Meshcat()
     plan = synthetic_plan(case("base"))
     with LivePage(load_scenario(SCENARIO), plan, meshcat, rate=inf, facts=lambda: FACTS) as page:
