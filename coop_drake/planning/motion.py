@@ -75,6 +75,10 @@ SPAN_TIME = 0.3
 PERIOD = 0.08
 """Time of a span of the motion that is made, about [s]."""
 
+MOST_SPANS = 600
+"""Largest number of spans of that length [-]; motions of slow teams have longer ones, which are not halved for
+the sake of limits between knots."""
+
 PARTS = 4
 """Parts of a span of the motion that is made, at whose ends cells may be entered and left [-]."""
 
@@ -391,7 +395,8 @@ def quickest_motion(
     for evenness, weights in ((NEARLY_EVEN, WEIGHTS[1]), (1.0, WEIGHTS[2])):
         before = last.points
         for finer in range(FINER + 1):
-            equal = uniform_points(before, PERIOD / 2**finer)
+            longest = max(PERIOD, float(before[-2, -1]) / MOST_SPANS)
+            equal = uniform_points(before, longest / 2**finer)
             try:
                 last = _Program(cells, chains, table, waiting, equal, evenness, PARTS)
             except PlanError:
@@ -399,7 +404,7 @@ def quickest_motion(
                     raise
                 continue
             last.solve(weights)
-            if not last.uniform or last.slow_down() < MUCH_SLOWER:
+            if not last.uniform or last.slow_down() < MUCH_SLOWER or longest > PERIOD:
                 break
     if not (np.diff(last.windows[:, 1]) > 0.0).all():
         raise PlanError("a cell is not left after the one before it")
