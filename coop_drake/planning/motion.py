@@ -76,8 +76,8 @@ PERIOD = 0.08
 """Time of a span of the motion that is made, about [s]."""
 
 MOST_SPANS = 600
-"""Largest number of spans of that length [-]; motions of slow teams have longer ones, which are not halved for
-the sake of limits between knots."""
+"""Largest number of spans of that length [-]; motions of slow teams have longer ones, and these are not halved
+for limits between knots."""
 
 PARTS = 4
 """Parts of a span of the motion that is made, at whose ends cells may be entered and left [-]."""

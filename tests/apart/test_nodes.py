@@ -252,7 +252,7 @@ def test_whenever_the_drives_brake_a_team_that_rests_returns_to_its_cell(tmp_pat
     goal = {"object": {"x": 3.5, "y": 2.0, "theta": 1.5}}
     file = write_scenario(tmp_path / "room.scenario.yaml", goal=goal, deployment={"preset": "mobile_base"})
     scenario = load_scenario(file)
-    answer = plan(scenario)
+    answer = plan(scenario, gains="scheduled")
     assert isinstance(answer, Found)
     gaps = [(round(begin * 200), round(begin * 200) + 60) for begin in (0.8, 3.8)]
     exchange = DirectExchange(gaps)

@@ -15,6 +15,7 @@ from coop_drake.scenario.checks import validate
 from coop_drake.simulation import Invariants, TeamClearance, build_maps, configure_simulator, simulate
 from coop_drake.simulation.telemetry import Telemetry
 from tests.support.run_checks import verified_run
+from tests.support.scenarios import resting
 from tests.support.small_loop import small_maps, small_problem
 
 MOMENTS = 50
@@ -31,7 +32,7 @@ SPEED, RATE = 0.01, 0.02
 @pytest.fixture(scope="module")
 def base():
     """The loop of base that can be told to hold, and its contexts at random moments of a run."""
-    scenario = replace(sc.load_scenario("base"), control=sc.Control(hold=sc.Hold()))
+    scenario = replace(resting(sc.load_scenario("base")), control=sc.Control(hold=sc.Hold()))
     problem = planning_problem(scenario)
     plan = plan_problem(problem, scenario.gain_sets["scheduled"], gain_set_name="scheduled").plan
     loop = build_closed_loop(scenario, plan, build_maps(plan))

@@ -310,7 +310,7 @@ def test_both_tiers_leave_the_same_record(gains, tmp_path, monkeypatch):
     path.write_text(FILE.replace("set: {", f"set: {{gains.selected: {gains}, "))
     variation = Variation(load_campaign(path))
     plans = Plans(variation, tmp_path)
-    monkeypatch.setattr(preparing, "_check", prepared.append)
+    monkeypatch.setattr(preparing, "_check", lambda scenario, **_: prepared.append(scenario))
     compiled, drake = (RunMaker(variation, plans, tier, tmp_path) for tier in ("compiled", "drake"))
     records = [compiled.record(variation.run(index)) for index in range(2)]
     assert len(prepared) == 1
