@@ -76,8 +76,7 @@ PERIOD = 0.08
 """Time of a span of the motion that is made, about [s]."""
 
 MOST_SPANS = 600
-"""Largest number of spans of that length [-]; motions of slow teams have longer ones, and these are not halved
-for limits between knots."""
+"""Largest number of spans of that length [-]; motions of slow teams have longer ones."""
 
 PARTS = 4
 """Parts of a span of the motion that is made, at whose ends cells may be entered and left [-]."""
@@ -404,6 +403,7 @@ def quickest_motion(
                     raise
                 continue
             last.solve(weights)
+            # Halved spans of a slow team would be too many.
             if not last.uniform or last.slow_down() < MUCH_SLOWER or longest > PERIOD:
                 break
     if not (np.diff(last.windows[:, 1]) > 0.0).all():

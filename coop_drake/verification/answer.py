@@ -126,9 +126,16 @@ def _proved_of_motion(plan: Plan) -> str:
     """What a plan's checks prove of how the cells lead from start to goal."""
     if plan.motion is None:
         return "which lead from start to goal"
+    held = ""
+    if plan.budget is not None:
+        what = "a team" if plan.budget.axes else "the object's position of a team"
+        held = (
+            f"; {what} that departs by no more than the plan's budget, as docs/budget.md says, stays in them"
+        )
     return (
         "in which the motion leads from start to goal; it keeps the limits of speed and acceleration, stated "
-        "or by default, also while it brakes, and can stop before it leaves a cell"
+        "or by default, also while it brakes and starts again, and can stop before it leaves a cell"
+        f"{held}"
     )
 
 
@@ -163,18 +170,19 @@ def _verified_way(plan: Plan, checks: tuple[Check, ...]) -> Verified:
 
 def _unproved_of_control(plan: Plan) -> str:
     """What a plan's checks leave open of whether a team stays in its cells."""
-    if plan.motion is not None:
-        return (
-            "that an ideal team, for which alone the motion is planned, follows it or brakes (the gains of "
-            "transitions are those of a team that rests in every cell); that motors can give the efforts "
-            "that the motion needs; that jerk is within its limit at every instant (only its mean over each "
-            "span is checked); that limits are kept while the team starts again after a stop"
-        )
     if plan.budget is None:
-        return "that a team stays in the cells (verify the log of its run, or plan with --budget)"
-    if plan.budget.axes:
-        return "that a team that departs by more than the plan's budget stays in the cells"
-    return "that angles and joints stay in the cells, nor what departs by more than the plan's budget"
+        left = "that a team stays in the cells (verify the log of its run"
+        left += ")" if plan.motion is None else ", or plan with --budget)"
+    elif plan.budget.axes:
+        left = "that a team that departs by more than the plan's budget stays in the cells"
+    else:
+        left = "that angles and joints stay in the cells, nor what departs by more than the plan's budget"
+    if plan.motion is None:
+        return left
+    jerk = "that jerk is within its limit at every instant (only its mean over each span is checked)"
+    if plan.departures is not None and plan.departures.effort.size:
+        return f"{left}; {jerk}"
+    return f"{left}; that motors can give the efforts that the motion needs; {jerk}"
 
 
 def verify_proof(

@@ -389,6 +389,9 @@ def test_a_budget_that_is_not_required_is_the_scenarios_own_or_said_not_to_be():
     free = replace(one.budgets, required="none")
     own = verify_plan(plan, one.problem, one.gains, budgets=free)
     assert own.subject.endswith("the budget is that of the scenario's deployment, all")
+    assert "a team that departs by no more than the plan's budget, as docs/budget.md says" in own.proved
+    assert own.not_proved.startswith("that a team that departs by more than the plan's budget stays in the")
+    assert "motors" not in own.not_proved  # The budget limits base forces.
     for smaller, said in (
         (
             {"model_error": 0.1},

@@ -152,7 +152,8 @@ def verify_log(
     checks += bodies.check_clearances(rows, between, problem, progress)
     if not braked:
         checks += check_budget_used(rows)
-    stayed = "" if braked else ", and the team stayed in cells and funnels"
+    where = "cells and funnels" if plan.motion is None else "cells"
+    stayed = "" if braked else f", and the team stayed in {where}"
     aside = _left_aside(setup, braked=braked)
     return Verified(
         "arrived",
