@@ -65,6 +65,9 @@ ATTEMPTS, GROWTH = 40, 1.01
 """Largest number of larger and larger pulls that are tried, and by which factor each is larger [-]."""
 
 
+LARGEST_PULL = 1e6
+"""No team that pulls harder is followed further [m/s^2, rad/s^2]."""
+
 CALMING = 3
 """How often the pulls of a team whose motion has ended are bounded anew by what they cause themselves [-]."""
 
@@ -313,6 +316,8 @@ def departures_of(
         if (again <= pulled).all():
             return stated_departures(loop, moving, couplings, (1.0 + SLACK) * pulled)
         pulled = np.maximum(pulled, GROWTH * again)
+        if not pulled.max() < LARGEST_PULL:
+            return None
     return None
 
 
