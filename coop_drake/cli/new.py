@@ -195,7 +195,7 @@ def _write(starter: Starter, folder: Path, reporter: Reporter, *, force: bool) -
 
     files = {
         f"{starter.name}.scenario.yaml": starter_text(starter),
-        "object.sdf": object_model(starter.length, starter.width, starter.robots),
+        "object.sdf": object_model(starter.length, starter.width, robots=starter.robots),
         "robot.sdf": robot_model("robot", starter.links, starter.base_radius),
     }
     for name in files:

@@ -223,8 +223,8 @@ _SLIDE_RATE = 0.5
 """Largest rate of sliding joints [m/s]: that of usual linear axes."""
 
 
-def object_model(length: float, width: float, robots: int) -> str:
-    """SDF of a box of 1 kg of a length along x and a width along y [m].
+def object_model(length: float, width: float, mass: float = 1.0, robots: int = 4) -> str:
+    """SDF of a box of a length along x, a width along y [m] and a mass [kg].
 
     Grasp frames have x outwards. Up to four robots hold the middles of the sides; more of them hold the ends,
     and the long sides at quarters of the length.
@@ -234,7 +234,7 @@ def object_model(length: float, width: float, robots: int) -> str:
     for x in (off, -off) if off else (0.0,):
         grasps += [(x, 0.5 * width, pi / 2), (-x, -0.5 * width, -pi / 2)]
     return boxes_model(
-        [(0.0, 0.0, length, width)], grasps, 1.0, "The carried object, with grasp frames on every side."
+        [(0.0, 0.0, length, width)], grasps, mass, "The carried object, with grasp frames on every side."
     )
 
 
