@@ -117,6 +117,7 @@ def test_a_run_answers_with_one_json_object_and_exit_code_0(finished):
     assert facts["violations"] == 0
     assert facts["final_position_error_m"] <= 0.01
     assert facts["min_clearance_m"] > 0.0
+    assert facts["estimated_seconds"] == pytest.approx(facts["simulated_seconds"], rel=0.02)
     assert len(result.stdout.splitlines()) == 1
 
 

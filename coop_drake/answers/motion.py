@@ -91,6 +91,11 @@ class Motion:
     gains: TeamGains
 
     @property
+    def run_time(self) -> float:
+        """How long a run without holds takes [s]: the words of its start, 3 W, then the motion."""
+        return self.duration + 1.5 * self.waiting
+
+    @property
     def duration(self) -> float:
         """How long it takes [s]."""
         return (len(self.points) - 3) * self.period

@@ -167,7 +167,7 @@ def plan_facts(plan: Plan) -> dict[str, Any]:
         **budgeted,
         "cells": len(plan.cells),
         "narrowest_neck_m": min(transition.neck for transition in plan.transitions),
-        "estimated_seconds": plan.motion.duration
+        "estimated_seconds": plan.motion.run_time
         if plan.motion
         else sum(transition.estimated_time for transition in plan.transitions),
         "gains": plan.gain_set,
