@@ -104,3 +104,14 @@ class Motion:
 def cell_times(motion: Motion) -> FloatArray:
     """Return the times from entry to entry, in the last cell to the end, shape (cells,) [s]."""
     return np.diff(motion.windows[:, 0], append=motion.duration)
+
+
+def pull_gains(age: float) -> TeamGains:
+    """Return K_t and zeta_t of a team without a budget, for position and axes alike.
+
+    Args:
+        age: How old commands are when they act: what is measured, computed, and followed with a lag [s].
+    """
+    damping = min(LARGEST_DAMPING, AGE_PHASE / age) if age > 0.0 else LARGEST_DAMPING
+    gains = 0.25 * damping * damping, damping
+    return gains, gains

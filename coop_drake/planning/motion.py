@@ -43,7 +43,7 @@ import shapely
 from numpy.typing import NDArray
 from scipy.interpolate import BSpline
 
-from coop_drake.answers.motion import AGE_PHASE, LARGEST_DAMPING, WAITING, Motion, TeamGains
+from coop_drake.answers.motion import WAITING, Motion, TeamGains
 from coop_drake.answers.plan import Plan
 from coop_drake.answers.problem import PlanningProblem
 from coop_drake.errors import PlanError
@@ -343,17 +343,6 @@ def _time_shares(s: Value) -> tuple[Value, Value, Value, Value]:
     Where spans are equal, it is.
     """
     return (1.0 - s) / 6.0, (4.0 - 3.0 * s) / 6.0, (1.0 + 3.0 * s) / 6.0, s / 6.0
-
-
-def pull_gains(age: float) -> TeamGains:
-    """Return K_t and zeta_t of a team without a budget, for position and axes alike.
-
-    Args:
-        age: How old commands are when they act: what is measured, computed, and followed with a lag [s].
-    """
-    damping = min(LARGEST_DAMPING, AGE_PHASE / age) if age > 0.0 else LARGEST_DAMPING
-    gains = 0.25 * damping * damping, damping
-    return gains, gains
 
 
 def quickest_motion(

@@ -15,7 +15,7 @@ from shapely.errors import ShapelyError
 
 from coop_drake.answers.budget import Budget
 from coop_drake.answers.document import problem_digest
-from coop_drake.answers.motion import cell_times
+from coop_drake.answers.motion import cell_times, pull_gains
 from coop_drake.answers.plan import (
     SLOWEST_AGE,
     BeyondLimits,
@@ -234,7 +234,7 @@ def _passing(
     progress: Progress | None,
 ) -> Plan | BeyondBudget:
     """The plan of a team that passes from cell to cell, with its motion: this keeps the limits."""
-    from coop_drake.planning.motion import pull_gains, quickest_motion  # Here: it imports scipy.
+    from coop_drake.planning.motion import quickest_motion  # Here: it imports scipy.
     from coop_drake.planning.motion_limits import motion_limits
     from coop_drake.planning.tolerance import tolerant_motion
 

@@ -6,10 +6,11 @@ from dataclasses import replace
 from functools import cache
 
 from coop_drake import Found, Scenario, load_scenario, plan
+from coop_drake.answers.motion import pull_gains
 from coop_drake.answers.plan import Plan
 from coop_drake.answers.problem import PlanningProblem
 from coop_drake.laws import GainSet
-from coop_drake.planning.motion import pull_gains, quickest_motion
+from coop_drake.planning.motion import quickest_motion
 from coop_drake.planning.motion_limits import motion_limits
 from coop_drake.plant.facts import budget_of
 from coop_drake.plant.problem import planning_problem

@@ -17,11 +17,12 @@ from coop_drake import Found, save_plan
 from coop_drake import plan as make
 from coop_drake.answers import motion as defaults
 from coop_drake.answers.document import problem_digest
+from coop_drake.answers.motion import pull_gains
 from coop_drake.answers.problem import TeamLimits
 from coop_drake.errors import PlanError, RefusalError
 from coop_drake.laws import ScheduledGains
 from coop_drake.planning.duration import timed
-from coop_drake.planning.motion import pull_gains, quickest_motion
+from coop_drake.planning.motion import quickest_motion
 from coop_drake.planning.motion_limits import base_chains, base_places, motion_limits
 from coop_drake.plant.problem import planning_problem
 from coop_drake.verification import verify_file, verify_plan
