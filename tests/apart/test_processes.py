@@ -485,7 +485,7 @@ def test_clocks_that_are_more_wrong_than_the_plan_allows_stop_the_team():
 
 
 def test_a_passing_team_of_which_a_robot_stays_away_ends_at_rest():
-    log, facts, _ = run(passing_problem(), {120: kill(0)}, restarts=0, rejoin=0.1)
+    log, facts, _ = run(passing_problem(), {120: kill(0)}, restarts=0, rejoin=1.0)
     assert not log.reached
     assert "robot 0 has not answered since t = 0.595 s; the team rests since" in log.violation
     assert nothing_touched(log)
