@@ -18,7 +18,7 @@ from coop_drake.laws import GainSet
 from coop_drake.planning.cells.cells import FreeBox
 from coop_drake.planning.channel import Channel
 from coop_drake.planning.transitions import make_plan
-from coop_drake.scenario import Goal, ObjectPose, Scenario, Start, Tolerances, Workspace
+from coop_drake.scenario import Goal, ObjectPose, Scenario, Start, Tolerances, Workspace, with_gains
 from paper.table_1 import ANGLE_TOLERANCE, CORRECTED, GOAL_ANGLE, START
 
 __all__ = ["corridor_plan", "corridor_scenario"]
@@ -28,7 +28,7 @@ _STEP, _HALF, _MARGIN, _BORDER = 0.3, 0.5, 0.05, 4.0
 
 
 def corridor_scenario(scenario: Scenario) -> Scenario:
-    """Return the scenario's team in the hall, from the start of Table 1 to its goal.
+    """Return the scenario's team in the hall, from the start of Table 1 to its goal; it rests in every cell.
 
     Args:
         scenario: Of a team of two robots with a joint each.
@@ -46,7 +46,7 @@ def corridor_scenario(scenario: Scenario) -> Scenario:
         name: (float(angle),) for name, angle in zip(names, START[1:], strict=True)
     }
     return replace(
-        scenario,
+        with_gains(scenario, scenario.selected_gains),
         workspace=Workspace(tuple((x, y) for x, y in hall.exterior.coords[:-1])),
         start=Start(ObjectPose(0.0, 0.0, float(START[0])), joints),
         goal=Goal(ObjectPose(length, 0.0, GOAL_ANGLE), {}, Tolerances(angle=ANGLE_TOLERANCE)),

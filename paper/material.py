@@ -12,7 +12,7 @@ from coop_drake.harmonic_maps import MapStore
 from coop_drake.laws import FixedGains
 from coop_drake.plant import build_team_plant, planning_problem
 from coop_drake.plant.team import ObjectInertia
-from coop_drake.scenario import Scenario
+from coop_drake.scenario import Scenario, with_gains
 from paper.approximation import Approximation, approximations, two_components
 from paper.comparison import GainFigures, compare_gains
 from paper.runs import Progress, Run, part_of, reproduce_runs
@@ -45,7 +45,7 @@ class Material:
 def gather(
     scenario: Scenario, *, store: MapStore | None = None, progress: Progress | None = None
 ) -> Material:
-    """Plan and simulate what the report compares.
+    """Plan and simulate what the report compares, with a team that rests in every cell as the paper's does.
 
     Args:
         scenario: The reconstruction: two robots with a joint each, and the gain sets that are compared.
@@ -59,6 +59,7 @@ def gather(
     table_2 = scenario.gain_sets["table_2"]
     if not isinstance(table_2, FixedGains):
         raise ScenarioError(str(scenario.path), "gains.sets.table_2", type(table_2).__name__, "!FixedGains")
+    scenario = with_gains(scenario, scenario.selected_gains)
     team = build_team_plant(scenario, DiagramBuilder())
     problem = planning_problem(scenario, team)
     played = compare_gains(scenario, progress=part_of(progress, 0, 2))  # First, for it refuses other teams.

@@ -13,7 +13,18 @@ from PIL import Image
 from coop_drake.drawing.colours import BLUE, VERMILLION
 from coop_drake.laws import FixedGains
 from coop_drake.plant.team import ObjectInertia
-from paper import Agreement, GainFigures, Material, exhibits, pages, slice_figure, write_report
+from coop_drake.scenario import load_scenario
+from paper import (
+    Agreement,
+    GainFigures,
+    Material,
+    corridor_scenario,
+    exhibits,
+    gather,
+    pages,
+    slice_figure,
+    write_report,
+)
 from paper.approximation import approximations, two_components
 from paper.background import ASSUMPTIONS, ERRATA
 from paper.errata_figure import errata_figure
@@ -46,6 +57,15 @@ def material():
             GainFigures(name, 20.0, 80.0, 9.0, 1.0, 0.01, 0.1, 1e-13, 1e-12, 0.0, "") for name in GAIN_SETS
         ),
     )
+
+
+def test_the_papers_team_rests_in_every_cell(monkeypatch):
+    asked = []
+    monkeypatch.setattr("paper.material.compare_gains", lambda scenario, **_: asked.append(scenario) or ())
+    monkeypatch.setattr("paper.material.reproduce_runs", lambda *these, **_: asked.extend(these) or ())
+    gather(load_scenario("base"))
+    assert [one.passes for one in asked] == [False] * 3
+    assert not corridor_scenario(load_scenario("base")).passes
 
 
 def judged(material):
