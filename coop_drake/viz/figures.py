@@ -258,29 +258,29 @@ def position_figure(log: SimulationLog) -> Figure:
 
 
 def angle_figure(log: SimulationLog) -> Figure:
-    """Draw the object's angle inside its funnel over time, and both measured from the funnel's middle."""
-    caption = "Figure 7. Angle of the object between the bounds of its funnel; below, both measured from the "
+    """Draw the object's angle inside its bounds over time, and both measured from their middle."""
+    caption = f"Figure 7. Angle of the object in its {_kept_in(log)}; below, both measured from the middle."
     labels = ["θ [rad]", "θ, from the middle [rad]"]
-    figure, axes = time_axes(log, f"{caption}funnel's middle.", labels, height=2.3)
+    figure, axes = time_axes(log, caption, labels, height=2.3)
     middle = 0.5 * (log.funnel_lower[:, 0] + log.funnel_upper[:, 0])
     for ax, origin in zip(axes, (np.zeros_like(middle), middle), strict=True):
-        _draw_funnel(ax, log, 0, origin)
+        _draw_bounds(ax, log, 0, origin)
         ax.plot(*break_at_switches(log, log.object_pose[:, 2] - origin), color=OBJECT, label="θ")
     canvas.legend_above(axes[0])
     return figure
 
 
 def joints_figure(tree: ComponentTree, log: SimulationLog, robot: int) -> Figure | None:
-    """Draw the joints of one robot inside their funnels over time; None for a robot without joints."""
+    """Draw the joints of one robot inside their bounds over time; None for a robot without joints."""
     joints = [joint for joint in tree.joints if joint.robot == robot]
     if not joints:
         return None
     name = log.robot_names[robot]
-    caption = f"Figure {min(10 + robot, 11)}. Joints of {name} between the bounds of their funnels."
+    caption = f"Figure {min(10 + robot, 11)}. Joints of {name} between the bounds of their {_kept_in(log)}s."
     labels = [f"{joint.name.split('::')[-1]} [{joint.unit}]" for joint in joints]
     figure, axes = time_axes(log, caption, labels)
     for joint, ax in zip(joints, axes, strict=True):
-        _draw_funnel(ax, log, 1 + joint.index, np.zeros_like(log.times))
+        _draw_bounds(ax, log, 1 + joint.index, np.zeros_like(log.times))
         ax.plot(log.times, log.joints[:, joint.index], color=robot_colour(robot), label="joint")
     canvas.legend_above(axes[0])
     return figure
@@ -447,11 +447,16 @@ def curves_figure(log: SimulationLog, caption: str, values: FloatArray, *labels:
     return figure
 
 
-def _draw_funnel(ax: Axes, log: SimulationLog, axis: int, origin: FloatArray) -> None:
-    """Draw both bounds of one axis' funnel, measured from an origin that may move, shape (T,)."""
+def _kept_in(log: SimulationLog) -> str:
+    """Return what keeps an axis: its funnel, or for a team that passes the interval of its cell."""
+    return "interval" if log.phases.size else "funnel"
+
+
+def _draw_bounds(ax: Axes, log: SimulationLog, axis: int, origin: FloatArray) -> None:
+    """Draw both bounds of one axis, measured from an origin that may move, shape (T,)."""
     times, lower = break_at_switches(log, log.funnel_lower[:, axis] - origin)
     _, upper = break_at_switches(log, log.funnel_upper[:, axis] - origin)
-    ax.fill_between(times, lower, upper, color=SKY, alpha=0.25, linewidth=0, label="funnel")
+    ax.fill_between(times, lower, upper, color=SKY, alpha=0.25, linewidth=0, label=_kept_in(log))
     for bound in (lower, upper):
         ax.plot(times, bound, color=INK, linewidth=0.7)
 

@@ -24,6 +24,7 @@ from pydrake.systems.framework import DiagramBuilder
 from shapely import MultiLineString, Point, Polygon, box, minimum_rotated_rectangle, union_all
 from shapely.geometry.base import BaseGeometry
 
+from coop_drake.answers.motion import OBJECT_ACCELERATION
 from coop_drake.answers.plan import Plan
 from coop_drake.drawing.colours import (
     BLUE,
@@ -101,11 +102,11 @@ _GRAVITY = 9.81
 """Acceleration of free fall [m/s^2]."""
 
 
-def force_of_a_metre(team: TeamPlant) -> float:
-    """Return the force that an arrow of one metre stands for [N]: about the object's weight per robot."""
-    weight = team.object_inertia.mass * _GRAVITY / len(team.robots)
-    decade = 10.0 ** floor(log10(weight))
-    return next(step * decade for step in (1.0, 2.0, 5.0, 10.0) if step * decade >= weight)
+def force_of_a_metre(team: TeamPlant, acceleration: float) -> float:
+    """Return the force of an arrow of one metre [N]: about a robot's share for an acceleration [m/s^2]."""
+    force = team.object_inertia.mass * acceleration / len(team.robots)
+    decade = 10.0 ** floor(log10(force))
+    return next(step * decade for step in (1.0, 2.0, 5.0, 10.0) if step * decade >= force)
 
 
 def set_arrows(meshcat: Meshcat, colours: list[Rgba]) -> None:
@@ -578,7 +579,8 @@ class TransportScene:
         set_stage(meshcat, self._floor, self._height)
         set_cells(meshcat, plan)
         self.team = TeamView(scenario, meshcat)
-        self.of_a_metre = force_of_a_metre(self.team.team)
+        acceleration = _GRAVITY if plan.motion is None else OBJECT_ACCELERATION
+        self.of_a_metre = force_of_a_metre(self.team.team, acceleration)
         set_arrows(meshcat, self.team.colours)
         set_goal(meshcat, self._footprint(plan.goal_pose), *self.team.object_heights())
         shadow = flat_mesh(parts_of(self._footprint(np.zeros(3))), _SHADOW_HEIGHT)

@@ -28,9 +28,10 @@ from coop_drake.scenario import load_scenario
 from coop_drake.viz import LivePage, LiveView, inline_frame, live, recording_html, write_recording
 from coop_drake.viz.live import stop_words
 from coop_drake.viz.recording import kept_frames, page_content, silent_meshcat, with_overlay
-from coop_drake.viz.scene import TeamView, hex_colour, illustrations, paint_robots, set_stage
+from coop_drake.viz.scene import TeamView, TransportScene, hex_colour, illustrations, paint_robots, set_stage
 from tests.support.cases import case
 from tests.support.scenarios import MODELS
+from tests.support.small_plan import with_motion
 from tests.support.synthetic_log import synthetic_log, synthetic_plan
 
 _MESSAGE = re.compile(r'fetch\("data:application/octet-binary;base64,([A-Za-z0-9+/=]+)"\)')
@@ -366,6 +367,14 @@ def test_an_arrow_is_as_long_as_the_force_is_strong(text):
     lengths = played(text, "/forces/robot_0", "scale", times)[:, 0]
     # Half the weight of one kilogram is a metre, to the next round number.
     np.testing.assert_allclose(lengths, np.interp(times, log.times, strength) / 5.0, rtol=0, atol=0.05)
+
+
+def test_arrows_of_a_team_that_passes_are_longer_for_its_forces_are_smaller():
+    scenario, plan, _ = base()
+    plans = (plan, with_motion(plan))
+    scales = [TransportScene(scenario, each, silent_meshcat()).of_a_metre for each in plans]
+    # Half a kilogram's weight, and the force that gives it 1.5 m/s^2, each to the next round number.
+    assert scales == pytest.approx([5.0, 1.0])
 
 
 def test_the_trail_grows_from_nothing_to_the_whole_way(text):
