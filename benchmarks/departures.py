@@ -23,7 +23,7 @@ from coop_drake import (
     simulate,
 )
 from coop_drake.errors import PlanError
-from coop_drake.scenario import Control, Deployment
+from coop_drake.scenario import Control, Deployment, with_gains
 from coop_drake.typed_data import convert_class
 
 TEAMS = ("base", "tight")
@@ -165,7 +165,7 @@ def deployment_of(data: Mapping[str, Any]) -> Deployment:
 
 
 def departing(team: str, deployment: Deployment, control: Control, *, known: bool = True) -> SimulationLog:
-    """Plan a shipped transport with a deployment and additions to the controllers, and simulate it.
+    """Plan a shipped transport that rests in every cell, with a deployment and additions, and simulate it.
 
     Args:
         team: Name of the shipped scenario.
@@ -173,7 +173,7 @@ def departing(team: str, deployment: Deployment, control: Control, *, known: boo
         control: The additions.
         known: Whether the plan is made for this deployment, otherwise for the ideal team.
     """
-    ideal = load_scenario(team)
+    ideal = with_gains(load_scenario(team), "scheduled")
     scenario = replace(ideal, deployment=deployment, control=control)
     planned = scenario if known else ideal
     return simulate(scenario, *planned_transport(team, planned.command_age, planned))
