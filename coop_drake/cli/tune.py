@@ -97,9 +97,7 @@ def tune_command(
     wanted = criteria or ["peak_force"], ["time<=1x"] if limits is None else limits
     weights, kept = read_weights(wanted[0]), tuple(map(Limit.parse, wanted[1]))
     task = read_task(scenario, gains, reporter)
-    if (
-        task.scenario.passes
-    ):  # Its motion has no gain set to tune; that of a team that rests in every cell has.
+    if task.scenario.passes:  # Its motion has no gain set to tune; a team that rests in every cell has one.
         task = read_task(scenario, SCHEDULED, reporter)
     start = task.scenario.gain_sets[task.scenario.selected_gains]
     parameters = tunable_parameters(start, vary or ())
