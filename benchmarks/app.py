@@ -36,7 +36,7 @@ from benchmarks.questions.question import random_question
 from benchmarks.rejoining import rejoining_tasks
 from benchmarks.rows import Ledger, LedgerError
 from benchmarks.simulating import simulating_tasks
-from benchmarks.smooth import smooth_tasks
+from benchmarks.smooth import RUNS, smooth_tasks
 from benchmarks.study import Study, batches_of, load_study, make_study, show_results
 from benchmarks.table import TOPICS, WHOLE, show, show_contents
 from benchmarks.tasks import Task, chosen, worked
@@ -132,6 +132,7 @@ def main(
     seeds: Annotated[int, typer.Option(min=1, help="Runs of every peer.")] = 10,
     budget: Annotated[float, typer.Option(min=0.1, help="CPU seconds of every run of OMPL.")] = 8.0,
     limit: Annotated[float, typer.Option(min=1.0, help="CPU seconds of every answer of ours.")] = _LIMIT,
+    runs: Annotated[int, typer.Option(min=1, help="Compiled runs of each team in smooth/budget.")] = RUNS,
     jobs: Annotated[
         int, typer.Option(min=1, help="Processes at the same time, where figures stand that.")
     ] = 2,
@@ -141,7 +142,7 @@ def main(
     """Measure what exists on this machine, each figure beside a peer of the same run."""
     console = Console(stderr=True, highlight=False)
     topics = [] if topics == ["all"] else topics or []
-    tasks = chosen(_tasks(Effort(seeds, budget, limit)), topics, only or [])
+    tasks = chosen(_tasks(Effort(seeds, budget, limit), runs), topics, only or [])
     if not tasks:
         asked = escape(" ".join([*topics, *(only or [])]))
         console.print(f"[bold red]Error:[/] nothing is called {asked}")
@@ -165,7 +166,7 @@ def main(
     raise typer.Exit(code)
 
 
-def _tasks(effort: Effort) -> list[Task]:
+def _tasks(effort: Effort, runs: int) -> list[Task]:
     """Everything there is to measure."""
     return [
         *head_to_head_tasks(effort),
@@ -187,7 +188,7 @@ def _tasks(effort: Effort) -> list[Task]:
         *compiled_tasks(),
         *adversary_tasks(),
         *message_tasks(),
-        *smooth_tasks(),
+        *smooth_tasks(runs),
         *word_tasks(),
         *apart_tasks(),
         *rejoining_tasks(),

@@ -1,4 +1,4 @@
-"""Teams that pass beside teams that rest: times, stops, dips, shares of limits, with and without noise."""
+"""Teams that pass beside teams that rest: times, stops, limits, squeezing; budgets at three speeds."""
 
 from __future__ import annotations
 
@@ -8,6 +8,9 @@ from functools import partial
 from time import process_time
 
 import numpy as np
+import shapely
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import dijkstra
 
 from benchmarks.departures import deployment_of
 from benchmarks.rows import Row
@@ -20,7 +23,7 @@ from coop_drake.compiled_loop import prepare, run
 from coop_drake.compiling import COMPILING
 from coop_drake.errors import PlanError
 from coop_drake.plant import planning_problem
-from coop_drake.scenario import with_gains
+from coop_drake.scenario import Deployment, RobotDepartures, with_gains
 from coop_drake.scenario.model import RobotLimits
 from coop_drake.simulation import simulate
 from coop_drake.tree.arrays import FloatArray
@@ -29,7 +32,15 @@ QUICKEST = {"base": 12.2, "tight": 13.0, "three": 13.2, "elbow": 12.1, "warehous
 """The quickest ways through the floors at these limits that an uncertified search found once [s]."""
 
 RUNS = 200
-"""Compiled runs of each team under the preset, by seeds from 0 on."""
+"""Compiled runs of each team under the preset where the command line says nothing else."""
+
+SPEEDS = (0.5, 1.0, 1.5)
+"""Limits of the bases' speed at which plans under the preset's budget are asked for [m/s]."""
+
+CLOCKS = 0.002
+"""By how much clocks are ahead and behind in turn where squeezing is measured [s]."""
+
+_PRESET = {"preset": "mobile_base", "budget": "all"}
 
 _LIMITS = {
     "*": RobotLimits(
@@ -40,10 +51,17 @@ _LIMITS = {
 """Bases at 1 m/s, 1 rad/s, 1 m/s^2, 2 rad/s^2 and 10 m/s^3, the object at 1.5 m/s^2, joints at 1 and 2."""
 
 
-def smooth_tasks() -> list[Task]:
-    """Each shipped team that has a plan: the ideal one, and that of the preset under its budget."""
-    ideal = [Task(f"smooth/ideal/{team}", partial(_ideal, team)) for team in QUICKEST]
-    return [*ideal, *(Task(f"smooth/budget/{team}", partial(_under_budget, team)) for team in QUICKEST)]
+def smooth_tasks(runs: int = RUNS) -> list[Task]:
+    """Each shipped team: the ideal one, that of the preset under its budget, and plans at other speeds.
+
+    Args:
+        runs: Compiled runs of each team under the preset.
+    """
+    return [
+        *(Task(f"smooth/ideal/{team}", partial(_ideal, team)) for team in QUICKEST),
+        *(Task(f"smooth/budget/{team}", partial(_under_budget, team, runs)) for team in QUICKEST),
+        *(Task(f"smooth/speeds/{team}", partial(_at_speeds, team)) for team in QUICKEST),
+    ]
 
 
 def _scenario(team: str, **changes: object) -> Scenario:
@@ -68,7 +86,16 @@ def _ideal(team: str, _: Sequence[Row]) -> list[Row]:
     made, seconds = _planned(scenario)
     others, of_others = _planned(with_gains(scenario, "scheduled"))
     estimated = sum(one.estimated_time for one in others.transitions)
-    log = simulate(scenario, made, build_maps(made))
+    maps = build_maps(made)
+    log = simulate(scenario, made, maps)
+    clocks = {
+        robot: RobotDepartures(clock_error=CLOCKS * (-1.0) ** k) for k, robot in enumerate(log.robot_names)
+    }
+    apart = simulate(replace(scenario, deployment=Deployment(control_rate=200.0, robots=clocks)), made, maps)
+    if not apart.reached:
+        raise PlanError(f"{scenario.path}: with clocks {CLOCKS:g} s off: {apart.violation}")
+    shares = np.array([scenario.load_share(robot, len(log.robot_names)) for robot in log.robot_names])
+    way = float(np.hypot(*np.diff(log.object_pose[:, :2], axis=0).T).sum())
     dips, switches = dips_of(log)
     used = max(one.peak / one.limit for one in peak_speeds(log, planning_problem(scenario)) if one.limit)
     forces = np.hypot(log.base_wrenches[..., 0], log.base_wrenches[..., 1])
@@ -81,6 +108,9 @@ def _ideal(team: str, _: Sequence[Row]) -> list[Row]:
         Row(f"{name}/limit_used", used, "of a limit"),
         Row(f"{name}/object", float(pushed.max()), "m/s^2", "limit", 1.5),
         Row(f"{name}/force", float(forces.max()), "N"),
+        Row(f"{name}/squeezing", squeezing_of(log, shares), "N"),
+        Row(f"{name}/squeezing_clocks", squeezing_of(apart, shares), "N"),
+        Row(f"{name}/way", way, "m", "shortest in the cells' regions", shortest_way(made)),
         Row(f"{name}/planning", seconds, "s", "with stops", of_others),
     ]
 
@@ -101,23 +131,86 @@ def dips_of(log: SimulationLog) -> tuple[int, int]:
     return found, len(switches)
 
 
-def _under_budget(team: str, _: Sequence[Row]) -> list[Row]:
+def squeezing_of(log: SimulationLog, shares: FloatArray) -> float:
+    """Return the largest force with which a robot pushes against the others through the object [N].
+
+    It is the length of F_k - w_k (F_1 + ... + F_N), F_k the force of robot k on the object as the plant has
+    it, and w_k the robot's share of the load. These forces add up to zero, whatever moves the object.
+
+    Args:
+        log: The run.
+        shares: w, shape (N,), which add up to one [-].
+    """
+    forces = log.measured_wrenches[..., :2]
+    pushed = forces - shares[:, None] * forces.sum(axis=1, keepdims=True)
+    return float(np.hypot(pushed[..., 0], pushed[..., 1]).max())
+
+
+def shortest_way(made: Plan) -> float:
+    """Return the length of the shortest path from start to goal in the union of the cells' regions [m].
+
+    It may take cells in another order than the plan, so that no way through the cells is shorter. Such a path
+    runs straight between its ends and corners of the union: Dijkstra's algorithm finds it among all pairs
+    that see each other.
+    """
+    assert made.motion is not None  # as in every plan of a team that passes
+    union = shapely.union_all([cell.tidied for cell in made.cells])
+    corners = shapely.get_coordinates(union.simplify(0.0))
+    places = np.vstack([made.motion.points[[0, -1], :2], np.unique(corners, axis=0)])
+    first, second = np.triu_indices(len(places), 1)
+    lines = shapely.linestrings(places[np.stack([first, second], axis=1)])
+    room = union.buffer(1e-9)  # Lines along a boundary are not to be lost by rounding.
+    shapely.prepare(room)
+    seen = shapely.covers(room, lines)
+    lengths = (np.hypot(*(places[first] - places[second])[seen].T), (first[seen], second[seen]))
+    sight = coo_array(lengths, shape=(len(places), len(places)))
+    return float(dijkstra(sight.tocsr(), directed=False, indices=[0])[0, 1])
+
+
+def _at_speeds(team: str, _: Sequence[Row]) -> list[Row]:
+    """Return what plans take under the preset's budget at several speeds of the bases, or what is said."""
+    rows = []
+    for speed in SPEEDS:
+        limits = {**_LIMITS, "*": replace(_LIMITS["*"], base_speed=speed)}
+        ideal = replace(_scenario(team), limits=limits)
+        begun, compiling = process_time(), COMPILING.cpu_seconds
+        result = plan(replace(ideal, deployment=deployment_of(_PRESET)))
+        seconds = process_time() - begun - COMPILING.cpu_seconds + compiling
+        name, found = f"smooth/speeds/{team}_at_{speed:g}", isinstance(result, Found)
+        rows.append(Row(f"{name}/answer", float(found), "found" if found else type(result).__name__.lower()))
+        rows.append(Row(f"{name}/planning", seconds, "s"))
+        if isinstance(result, Found):
+            times = [
+                sum(one.estimated_time for one in made.transitions)
+                for made in (result.plan, _planned(ideal)[0])
+            ]
+            rows.append(Row(f"{name}/motion", times[0], "s", "ideal team", times[1]))
+    return rows
+
+
+def _under_budget(team: str, runs: int, _: Sequence[Row]) -> list[Row]:
     """Return what a plan under the preset's budget takes, and how compiled runs of it end."""
-    name, departures = f"smooth/budget/{team}", deployment_of({"preset": "mobile_base", "budget": "all"})
+    name, departures = f"smooth/budget/{team}", deployment_of(_PRESET)
     ideal, _seconds = _planned(_scenario(team))
     made, seconds = _planned(_scenario(team, deployment=departures))
     assert made.motion is not None  # as in every plan of a team that passes
     assert made.departures is not None
     assert ideal.motion is not None
     transport = prepare(_scenario(team, deployment=departures), made, build_maps(made))
-    outcomes = [run(transport, departures, seed=seed) for seed in range(RUNS)]
+    most, random = departures.mass_error, np.random.default_rng(0)
+    outcomes = [
+        run(transport, replace(departures, mass_error=float(error)), seed=seed)
+        for seed, error in enumerate(random.uniform(-most, most, runs))
+    ]
     return [
         Row(f"{name}/motion", made.motion.duration, "s", "ideal team", ideal.motion.duration),
         Row(f"{name}/room", 1e3 * float(made.departures.room[0]), "mm, of the position"),
-        Row(f"{name}/arrived", sum(outcome.arrived for outcome in outcomes), "runs", "all", RUNS),
+        Row(f"{name}/arrived", sum(outcome.arrived for outcome in outcomes), "runs", "all", runs),
+        Row(f"{name}/held", sum(outcome.held > 0 for outcome in outcomes), "runs"),
         Row(f"{name}/slowest", max(outcome.time for outcome in outcomes), "s"),
         Row(f"{name}/budget_share", max(outcome.budget_share for outcome in outcomes), "of the budget"),
         Row(f"{name}/alarm_share", max(outcome.alarm_share for outcome in outcomes), "of a level"),
+        Row(f"{name}/wall", 1e3 * min(outcome.wall_clearance for outcome in outcomes), "mm"),
         Row(f"{name}/force", max(outcome.peak_force for outcome in outcomes), "N"),
         Row(f"{name}/planning", seconds, "s"),
     ]
