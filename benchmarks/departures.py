@@ -179,17 +179,18 @@ def departing(team: str, deployment: Deployment, control: Control, *, known: boo
     return simulate(scenario, *planned_transport(team, planned.command_age, planned))
 
 
-_PLANS: dict[tuple[str, float], tuple[Plan, Sequence[HarmonicMap]]] = {}
+_PLANS: dict[tuple[str, float, bool], tuple[Plan, Sequence[HarmonicMap]]] = {}
 
 
 def planned_transport(team: str, age: float, scenario: Scenario) -> tuple[Plan, Sequence[HarmonicMap]]:
-    """Return plan and maps; of a deployment, they depend on the age of commands alone."""
-    if (team, age) not in _PLANS:
+    """Return plan and maps; they depend on the age of commands, and on whether the team passes."""
+    key = team, age, scenario.passes
+    if key not in _PLANS:
         result = plan(scenario)
         if not isinstance(result, Found):
             raise PlanError(f"{scenario.path}: no plan to measure departures on: {result.reason}")
-        _PLANS[team, age] = result.plan, build_maps(result.plan)
-    return _PLANS[team, age]
+        _PLANS[key] = result.plan, build_maps(result.plan)
+    return _PLANS[key]
 
 
 def _case_rows(team: str, name: str, case: Case, _: Sequence[Row]) -> list[Row]:

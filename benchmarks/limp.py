@@ -1,4 +1,4 @@
-"""What a robot whose drives give no effort does to the others: they brake, hold or follow the plan."""
+"""What a robot whose drives give no effort does to others of a team that rests in every cell."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from coop_drake.apart.node import Stillness
 from coop_drake.diagram import brakes_of, build_station, control_period
 from coop_drake.harmonic_maps import HarmonicMap
 from coop_drake.laws.actuators import braking_effort
-from coop_drake.scenario import Control, Floor, Hold, Scenario
+from coop_drake.scenario import Control, Floor, Hold, Scenario, with_gains
 from coop_drake.tree.arrays import FloatArray
 
 WAYS = ("brake", "hold", "follow", "brake_with_friction")
@@ -87,7 +87,8 @@ def limp_tasks() -> list[Task]:
 
 
 def _rows(team: str, index: int, at: float, _: Sequence[Row]) -> list[Row]:
-    scenario = replace(load_scenario(team), deployment=deployment_of({"preset": "mobile_base"}))
+    resting = with_gains(load_scenario(team), "scheduled")
+    scenario = replace(resting, deployment=deployment_of({"preset": "mobile_base"}))
     plan, maps = planned_transport(team, scenario.command_age, scenario)
     name = f"apart/limp/{team}_{label_of(index, at)}"
     return [row for way in WAYS for row in limp(f"{name}/{way}", scenario, plan, maps, index, at, way)]

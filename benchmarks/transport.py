@@ -1,4 +1,4 @@
-"""The base transport that maps and simulation are measured on, made once."""
+"""The base transport of a team that rests, by maps, that these and simulation are measured on, made once."""
 
 from __future__ import annotations
 
@@ -6,12 +6,13 @@ from functools import cache
 
 from coop_drake import Found, HarmonicMap, Plan, Scenario, build_maps, load_scenario, plan
 from coop_drake.errors import PlanError
+from coop_drake.scenario import with_gains
 
 
 @cache
 def base_plan() -> tuple[Scenario, Plan]:
     """Read and plan the base case."""
-    scenario = load_scenario("base")
+    scenario = with_gains(load_scenario("base"), "scheduled")
     result = plan(scenario)
     if not isinstance(result, Found):
         raise PlanError(f"{scenario.path}: no plan to measure maps and simulation on: {result.reason}")

@@ -10,7 +10,6 @@ from pydrake.systems.framework import DiagramBuilder
 from benchmarks.departures import deployment_of
 from benchmarks.isolated import in_own_process
 from benchmarks.planner.cases import Case
-from benchmarks.planner.family import first_question
 from benchmarks.planner.ours import Planned, plan_repeatedly
 from benchmarks.rows import Row
 from benchmarks.tasks import Task
@@ -70,15 +69,18 @@ def _rows(name: str, case: Case, limit: float) -> list[Row]:
 
 
 def plan_with_budgets(case: Case) -> dict[str, Planned]:
-    """Plan with every budget of the preset ``mobile_base``, after small questions have loaded the kernels.
+    """Plan with every budget of the preset ``mobile_base``, once all have loaded the kernels.
 
     Args:
         case: The scenario.
     """
-    scenario = replace(case.scenario(), deployment=deployment_of({"preset": "mobile_base"}))
+    deployment = deployment_of({"preset": "mobile_base"})
+    scenario = replace(case.scenario(), deployment=deployment)
+    unlimited = replace(deployment.actuators, base_force=None)  # what ``position`` takes
+    free = replace(scenario, deployment=replace(deployment, actuators=unlimited))
     problem = planning_problem(scenario, build_team_plant(scenario, DiagramBuilder()))
     budgets: dict[str, Budget | None] = {
-        label: None if choice is None else budget_of(choice, scenario, problem)
+        label: budget_of(choice, free if choice == "position" else scenario, problem) if choice else None
         for label, choice in BUDGETS.items()
     }
     most = budgets["refused"]
@@ -86,9 +88,8 @@ def plan_with_budgets(case: Case) -> dict[str, Planned]:
     budgets["refused"] = most.scaled(TOO_MUCH)
     gain_set = scenario.gain_sets["scheduled"]
     assert isinstance(gain_set, ScheduledGains)
-    for budget in budgets.values():  # The small question has another team.
-        small = None if budget is None else replace(budget, bodies=(), rotors=())
-        plan_repeatedly(first_question(), 1, PATIENCE, small, gain_set)
+    for budget in budgets.values():
+        plan_repeatedly(problem, 1, PATIENCE, budget, gain_set)
     return {
         label: min(
             plan_repeatedly(problem, REPEATS, PATIENCE, budget, gain_set), key=lambda done: done.cpu_seconds
