@@ -65,25 +65,25 @@ def _pushed(force: float) -> dict[str, Any]:
 
 CASES: Mapping[str, Case] = {
     "nothing": Case({"control_rate": None}),
-    "sampling": Case({}, {"control_rate": 15.0}),
-    "limits": Case({"actuators": {"base_force": 150.0}}, {"actuators": {"base_force": 10.0}}),
-    "lag": Case({"actuators": {"lag": 0.02}}, {"actuators": {"lag": 0.05}}, known=False),
+    "sampling": Case({"control_rate": 40.0}),
+    "limits": Case({"actuators": {"base_force": 150.0}}, {"actuators": {"base_force": 5.0}}),
+    "lag": Case({"actuators": {"lag": 0.02}}, {"actuators": {"lag": 0.2}}, known=False),
     "model error": Case({"mass_error": 0.3}, {"mass_error": -0.9}),
     "noise": Case(_measured(**_NOISE), _measured(**{name: 20.0 * size for name, size in _NOISE.items()})),
     "bounded errors": Case(_measured(waves=_waves(0.0015)), _measured(waves=_waves(0.04))),
-    "delay": Case(_measured(delay=0.02), _measured(delay=0.05), known=False),
+    "delay": Case(_measured(delay=0.02), _measured(delay=0.1), known=False),
     "lost measurements": Case(_measured(loss=0.3), _measured(loss=0.9)),
-    "late measurements": Case(_measured(late=0.5, late_by=0.02), _measured(late=0.8, late_by=0.5)),
+    "late measurements": Case(_measured(late=0.8, late_by=0.5)),
     "lost reports": Case({"messages": {"loss": 0.7}}, {"messages": {"loss": 1.0}}),
-    "late reports": Case({"messages": {"delay": 0.2}}),
-    "repeated reports": Case({"messages": {"repeat": 1.0, "delay": 0.05}}),
+    "late reports": Case({"messages": {"delay": 0.04}}),
+    "repeated reports": Case({"messages": {"repeat": 1.0, "delay": 0.04}}),
     "biased pose, one robot": Case(_first(pose_bias={"x": 0.005}), _first(pose_bias={"x": 0.02})),
     "biased pose, all": Case(
         {"robots": {"*": {"pose_bias": {"x": 0.005}}}}, {"robots": {"*": {"pose_bias": {"x": 0.02}}}}
     ),
-    "odometry": Case(_first(odometry_scale=0.05), _first(odometry_scale=1.0)),
+    "odometry": Case(_first(odometry_scale=0.02), _first(odometry_scale=0.05)),
     "late samples": Case(_first(sample_offset=0.0049)),
-    "clock": Case(_first(clock_error=0.01), _first(clock_error=0.1)),
+    "clock": Case(_first(clock_error=0.004), _first(clock_error=0.01)),
     "late switches": Case(_first(switch_delay=0.01), _first(switch_delay=0.1)),
     "silence": Case(
         _first(silence={"begin": 3.0, "duration": 2.0}), _first(silence={"begin": 3.0, "duration": None})
@@ -102,11 +102,11 @@ CASES: Mapping[str, Case] = {
     "wheels that slip": Case(
         _first(slip={"begin": 3.0, "share": 0.3}), _first(slip={"begin": 3.0, "share": 1.0})
     ),
-    "Coulomb friction": Case({"floor": {"coulomb_friction": 10.0}}, {"floor": {"coulomb_friction": 50.0}}),
-    "viscous friction": Case({"floor": {"viscous_friction": 20.0}}, {"floor": {"viscous_friction": 300.0}}),
+    "Coulomb friction": Case({"floor": {"coulomb_friction": 2.0}}, {"floor": {"coulomb_friction": 10.0}}),
+    "viscous friction": Case({"floor": {"viscous_friction": 2.0}}, {"floor": {"viscous_friction": 5.0}}),
     "friction of joints": Case({"joint_friction": {"coulomb": 0.1}}, {"joint_friction": {"coulomb": 10.0}}),
     "slope": Case({"floor": {"slope": 0.01745}}, {"floor": {"slope": 0.2}}),
-    "push": Case(_pushed(20.0), _pushed(300.0)),
+    "push": Case(_pushed(1.0), _pushed(20.0)),
     "start offset": Case(
         {"start_offset": {"x": 0.005, "theta": 0.005}}, {"start_offset": {"x": 0.005, "theta": 0.1}}
     ),
