@@ -44,7 +44,7 @@ QUESTIONS = {
     "channel": Question("a channel of base is found", "find_path", "base", 15),
     "proof": Question("a proof is made", "find_path", CLOSED, 15),
     "gains": Question("gains of a cell", "transition_gains", "base", 3),
-    "budget": Question("a budget is decided", "tolerant_plan", "base", 6),
+    "budget": Question("a budget is decided", "tolerant_motion", "base", 6),
     "simulate": Question("a transport is simulated", "simulate", "base", 25),
 }
 

@@ -73,7 +73,8 @@ def in_own_process(work: Callable[..., T], *arguments: Any, limit: float) -> Iso
         return Isolated(None, limit + GRACE, None)
     if process.returncode != 0:
         last = complaints.decode(errors="replace").splitlines()[-_LAST_LINES:]
-        raise WorkerError(f"{work.__module__}.{work.__qualname__} failed:\n" + "\n".join(last))
+        called = getattr(work, "func", work)
+        raise WorkerError(f"{called.__module__}.{called.__qualname__} failed:\n" + "\n".join(last))
     result: Isolated[T] = pickle.loads(answer)
     return result
 

@@ -81,15 +81,6 @@ def _unlimited(answer: Document, random: Random) -> None:
     answer["budget"][LIMITS[int(random.integers(len(LIMITS)))]] = None
 
 
-def _younger(answer: Document, random: Random) -> None:
-    _transition(answer, random)["tolerance"]["age_factor"] = 0.05
-
-
-def _at_rest(answer: Document, random: Random) -> None:
-    one = answer["transitions"][chosen(answer["transitions"][:-1], random)]  # the last one's has no effect
-    _scaled(one["gains"]["rest"], ("reach", "rate")[int(random.integers(2))], 100.0)
-
-
 def _quicker(answer: Document, random: Random) -> None:
     names = "speed_limit", "rate_limit", "acceleration_limit"
     gains, name = _transition(answer, random)["gains"], names[int(random.integers(3))]
@@ -102,24 +93,22 @@ def _refused_by(answer: Document, random: Random) -> None:
     answer["refused_by"] = [refusal | {"joint": ""}]
 
 
-def _statement(factor: float, *names: str) -> Claim:
-    """State a smaller number of a tolerance."""
+def _departures(factor: float, *names: str) -> Claim:
+    """State other numbers of what departs from the motion."""
 
     def alter(answer: Document, random: Random) -> None:
-        stated = _transition(answer, random)["tolerance"]
-        _scaled(stated, names[chosen(names, random)], factor)
+        _scaled(answer["departures"], names[chosen(names, random)], factor)
 
     return alter
 
 
-def _levels(answer: Document, random: Random) -> None:
-    names = [name for name, value in answer["alarms"].items() if value is not None]
-    _scaled(answer["alarms"], names[chosen(names, random)], 1.0 + step(random, 1e-3))
+def _motion(name: str, factor: float) -> Claim:
+    """State another number of the motion."""
 
+    def alter(answer: Document, _: Random) -> None:
+        _scaled(answer["motion"], name, factor)
 
-def _tube(answer: Document, random: Random) -> None:
-    names = "radius", "rate", "velocity", "rest", "acceleration", "ahead"
-    _scaled(answer["tube"], names[chosen(names, random)], 0.99)
+    return alter
 
 
 def _sooner(answer: Document, random: Random) -> None:
@@ -134,17 +123,20 @@ CLAIMS: dict[str, Claim] = {
     "a heavier body": _heavier,
     "a smaller budget": _smaller,
     "an effort without a limit": _unlimited,
-    "gains for younger commands": _younger,
-    "another rest": _at_rest,
     "stiffness": _gains("stiffness", 0.5, 1.1, 3.0),
     "damping": _gains("damping", 0.5, 1.1),
     "governor gain": _gains("governor_gain", 0.5, 1.1),
     "limits of rates": _quicker,
     "refused by a limit": _refused_by,
-    "departures": _statement(0.9, "departure", "rate_departure", "acceleration", "settled"),
-    "efforts": _statement(0.1, "effort"),
-    "levels of monitors": _levels,
-    "a narrower tube": _tube,
+    "departures": _departures(0.99, "position", "rate", "acceleration", "ahead", "rest", "room"),
+    "pulls": _departures(0.99, "pull"),
+    "efforts": _departures(0.1, "effort"),
+    "levels of monitors": _departures(1.01, "alarm", "rate_alarm", "ahead_alarm"),
+    "less noise as a rule": _departures(0.99, "usual_rate", "usual_acceleration"),
+    "a quicker motion": _motion("period", 0.9),
+    "brakes that are too slow": _motion("rates", 0.5),
+    "words that take no time": _motion("waiting", 0.5),
+    "a sudden start": _motion("start_rate", 3.0),
     "a sooner arrival": _sooner,
 }
 """By kind: alters a plan's document."""
