@@ -211,12 +211,12 @@ def schedule_of(
             raise ValueError(
                 f"cell {i} must be begun after its entry, and be left after the next one is begun"
             )
-        if not last and not begins[i] + 2.0 * window <= brakes[i] < ends[i]:
+        if not last and not begins[i] + 2.0 * window - ROUNDING <= brakes[i] < ends[i]:
             raise ValueError(
                 f"the brake phase of cell {i} must be at least {2.0 * window:g} s after its begin, and "
                 "before its end"
             )
-        if not last and not ends[i] - entries[i + 1] >= 2.0 * clock_error:
+        if not last and not ends[i] - entries[i + 1] >= 2.0 * clock_error - ROUNDING:
             raise ValueError(f"cells {i} and {i + 1} must overlap for at least {2.0 * clock_error:g} s")
         if last and not (brakes[i] < ends[i] and (i == 0 or brakes[i] >= brakes[i - 1])):
             raise ValueError(

@@ -117,6 +117,9 @@ their regions [m]; and the largest share of an interval that this distance may t
 nearer to a boundary, the motion keeps nine tenths of its distance. So a log can show that the states between
 its rows are in the cells, too."""
 
+LARGEST_START = 10.0
+"""Largest rate alpha of a start [1/s], for motions that need hardly any acceleration."""
+
 LIMIT_SHARE = 0.995
 """Share of every limit that a motion uses [-]: the team departs from it by rounding and integration."""
 
@@ -592,5 +595,5 @@ class _Program:
         self.points[:, -1] *= factor
         brake(self.points, self.windows, self.waiting, self.kappa, self.acting)
         # With rho' up to alpha (1 - rho^2), a start keeps the limits of acceleration where alpha V does.
-        self.start_rate = float(factor) / starting
+        self.start_rate = min(float(factor) / starting, LARGEST_START)
         return float(factor)

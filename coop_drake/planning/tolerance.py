@@ -161,13 +161,13 @@ class _Question:
     ) -> Plan | str:
         """Plan with room for what a motion needs, and again until the new one needs no more than it has."""
         room = np.zeros(len(self.problem.start) - 1)
-        for _ in range(ROOMS):
+        for attempt in range(ROOMS):
             team = team_couplings(budget, self.problem.tree, plan.cells)
             found = _least_departures(budget, moving_of(motion), team, goal_tolerances(self.problem))
             if isinstance(found, str):
                 return found
             gains, away = found
-            if (away.room <= room).all():
+            if attempt and (away.room <= room).all():  # Regions of the first plan have no room.
                 return replace(plan, budget=budget, motion=replace(motion, gains=gains), departures=away)
             room = np.maximum(room, SPARE * away.room)
             noisy = speed_departures(self.problem.tree, self.problem.limits, away)

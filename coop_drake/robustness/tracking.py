@@ -284,12 +284,11 @@ def _mistimed(budget: Budget, moving: Moving, couplings: Couplings) -> FloatArra
     """Return by how much commands differ from what the motion needs where they act, shape (cells, 2 + n).
 
     A command for T/2 + lag ahead acts, in the mean over its period, at a time that differs from this by
-    2 lag / exp(1) in the mean, by the exponential distribution of a lag, and by eps. In this time nominal
-    accelerations change by their jerk, and what rates cause by accelerations. Stops are known earlier. Within
-    a period the command does not change; what is wrong of it then has no mean, and moves e by at most
-    T^3 / 12 times the jerk, which is nothing.
+    2 lag / exp(1) in the mean, by the exponential distribution of a lag, and by eps. Within its period it
+    does not change, and is half a period away at most. In this time nominal accelerations change by their
+    jerk, and what rates cause by accelerations. Stops are known earlier.
     """
-    time = 2.0 * exp(-1.0) * budget.lag + budget.clock_error
+    time = 2.0 * exp(-1.0) * budget.lag + budget.clock_error + 0.5 * budget.period
     w, a, rates = moving.rate[:, 1:], moving.acceleration[:, 1:], couplings.rates
     turning = np.einsum("cj,cijk,ck->ci", a, rates, w) + np.einsum("cj,cijk,ck->ci", w, rates, a)
     found: FloatArray = time * (moving.jerk + turning)

@@ -174,7 +174,8 @@ def _unproved_of_control(plan: Plan) -> str:
         left = "that a team stays in the cells (verify the log of its run"
         left += ")" if plan.motion is None else ", or plan with --budget)"
     elif plan.budget.axes:
-        left = "that a team that departs by more than the plan's budget stays in the cells"
+        left = "that a team that departs by more than the plan's budget stays in the cells, or by more than "
+        left += "docs/budget.md estimates"
     else:
         left = "that angles and joints stay in the cells, nor what departs by more than the plan's budget"
     if plan.motion is None:

@@ -433,6 +433,11 @@ def _check_limits(
     ways = [_parts(i, begin, end) for i, (begin, end) in enumerate(zip(begins, windows[:, 1], strict=True))]
     every = _Parts(*(np.concatenate([getattr(way, name) for way in ways]) for name in _Parts._fields))
     movers = list(_movers(problem, noisy))
+    for mover in movers:
+        if not mover.speed > 0.0:
+            raise RefusalError(
+                "departures.usual_rate", f"is as large as the limit of {mover.name}, or larger"
+            )
     found = [_prove_limits(motion, mover, every) for mover in movers]
     name = "limits of speed and acceleration are kept at all times, in stops and starts, too"
     kept = Check(
