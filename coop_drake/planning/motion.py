@@ -527,6 +527,8 @@ class _Program:
         if parts == 1:
             steps = np.diff(self.points[:, -1])
             for before, after in zip(self.last[:-1], self.first[1:], strict=True):
+                if before < after:
+                    raise PlanError("two cells of the motion share no span")
                 longest = after + int(np.argmax(steps[after + 1 : before + 2]))
                 self.shortest[longest + 1] = min(SHORTEST_OVERLAP, 0.999 * steps[longest + 1])
         self.course = Course(
