@@ -11,6 +11,7 @@ import numpy as np
 import shapely
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import dijkstra
+from shapely import Polygon
 
 from benchmarks.departures import deployment_of
 from benchmarks.rows import Row
@@ -95,6 +96,7 @@ def _ideal(team: str, _: Sequence[Row]) -> list[Row]:
     if not apart.reached:
         raise PlanError(f"{scenario.path}: with clocks {CLOCKS:g} s off: {apart.violation}")
     shares = np.array([scenario.load_share(robot, len(log.robot_names)) for robot in log.robot_names])
+    shortest = shortest_way([cell.tidied for cell in made.cells], log.object_pose[[0, -1], :2])
     way = float(np.hypot(*np.diff(log.object_pose[:, :2], axis=0).T).sum())
     dips, switches = dips_of(log)
     used = max(one.peak / one.limit for one in peak_speeds(log, planning_problem(scenario)) if one.limit)
@@ -110,7 +112,7 @@ def _ideal(team: str, _: Sequence[Row]) -> list[Row]:
         Row(f"{name}/force", float(forces.max()), "N"),
         Row(f"{name}/squeezing", squeezing_of(log, shares), "N"),
         Row(f"{name}/squeezing_clocks", squeezing_of(apart, shares), "N"),
-        Row(f"{name}/way", way, "m", "shortest in the cells' regions", shortest_way(made)),
+        Row(f"{name}/way", way, "m", "shortest in the cells' regions", shortest),
         Row(f"{name}/planning", seconds, "s", "with stops", of_others),
     ]
 
@@ -146,17 +148,20 @@ def squeezing_of(log: SimulationLog, shares: FloatArray) -> float:
     return float(np.hypot(pushed[..., 0], pushed[..., 1]).max())
 
 
-def shortest_way(made: Plan) -> float:
-    """Return the length of the shortest path from start to goal in the union of the cells' regions [m].
+def shortest_way(regions: Sequence[Polygon], ends: FloatArray) -> float:
+    """Return the length of the shortest path from one point to another in the union of regions [m].
 
-    It may take cells in another order than the plan, so that no way through the cells is shorter. Such a path
-    runs straight between its ends and corners of the union: Dijkstra's algorithm finds it among all pairs
-    that see each other.
+    It may take cells of a plan in another order than the plan, so that no way through them is shorter. Such
+    a path runs straight between its ends and corners of the union: Dijkstra's algorithm finds it among all
+    pairs that see each other.
+
+    Args:
+        regions: The regions [m].
+        ends: The two points, shape (2, 2) [m].
     """
-    assert made.motion is not None  # as in every plan of a team that passes
-    union = shapely.union_all([cell.tidied for cell in made.cells])
+    union = shapely.union_all(regions)
     corners = shapely.get_coordinates(union.simplify(0.0))
-    places = np.vstack([made.motion.points[[0, -1], :2], np.unique(corners, axis=0)])
+    places = np.vstack([ends, np.unique(corners, axis=0)])
     first, second = np.triu_indices(len(places), 1)
     lines = shapely.linestrings(places[np.stack([first, second], axis=1)])
     room = union.buffer(1e-9)  # Lines along a boundary are not to be lost by rounding.

@@ -395,7 +395,6 @@ def quickest_motion(
                     raise
                 continue
             last.solve(weights)
-            # Halved spans of a slow team would be too many.
             if not last.uniform or last.slow_down() < MUCH_SLOWER or longest > PERIOD:
                 break
     if not (np.diff(last.windows[:, 1]) > 0.0).all():

@@ -4,6 +4,7 @@ import json
 import math
 import threading
 import time
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ from benchmarks.domains import Domain
 from benchmarks.isolated import WorkerError, in_own_process
 from benchmarks.map_rows import RESIDUAL, cost_rows, map_rows
 from benchmarks.rows import Ledger, LedgerError, Row
+from benchmarks.smooth import shortest_way, squeezing_of
 from benchmarks.tasks import Task, worked
 
 BASE = Row("planner/base/cpu_seconds", 0.5, "s", "OMPL", 0.25)
@@ -106,7 +108,7 @@ def run(monkeypatch, tmp_path):
     """Run the command with other tasks; returns its result and the rows that it wrote, None for no file."""
 
     def run(tasks, *arguments):
-        monkeypatch.setattr(benchmark, "_tasks", lambda effort: tasks)
+        monkeypatch.setattr(benchmark, "_tasks", lambda effort, runs: tasks)
         monkeypatch.setattr(benchmark, "compile_kernels", int)
         out = tmp_path / "deep" / "bench.json"
         result = CliRunner().invoke(benchmark.app, [*arguments, "--out", str(out)])
@@ -134,3 +136,15 @@ def test_a_map_is_measured_beside_its_peers_and_a_shape_that_is_refused_is_a_row
     needle = Domain(Polygon([(0, 0), (3, 0), (0, 0.01)]), Point(0.1, 0.003))
     refused = cost_rows("mapping/growth/needle", needle)
     assert [(row.figure, row.unit) for row in refused] == [("answer", "refused"), ("vertices", "-")]
+
+
+def test_squeezing_is_what_is_left_of_a_force_without_the_share_of_their_sum():
+    forces = [[[2.0, 4.0, 9.0], [6.0, 12.0, 9.0]], [[5.0, 1.0, 0.0], [3.0, 7.0, 0.0]]]
+    log = SimpleNamespace(measured_wrenches=np.array(forces))
+    assert squeezing_of(log, np.array([0.25, 0.75])) == pytest.approx(math.hypot(3.0, 1.0))
+
+
+def test_the_shortest_way_through_two_regions_bends_at_the_corner_between_them():
+    ends = np.array([[0.5, 0.5], [2.5, 2.5]])
+    shortest = shortest_way([box(0, 0, 1, 3), box(0, 2, 3, 3)], ends)
+    assert shortest == pytest.approx(math.hypot(0.5, 1.5) + math.hypot(1.5, 0.5))
