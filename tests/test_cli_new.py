@@ -77,6 +77,17 @@ def test_a_floor_plan_takes_the_place_of_the_rooms(tmp_path):
     assert load_scenario(path).workspace.polygon.area == pytest.approx(60.0)
 
 
+def test_a_floor_plan_may_stand_where_the_scenario_goes(tmp_path, monkeypatch):
+    write_svg(tmp_path, '<rect width="10" height="6"/>')
+    monkeypatch.chdir(tmp_path)
+    poses = ["--start", 2, 2, 0, "--goal", 8, 4, 1.57]
+    done = call("mine", "--floor-plan", "hall.svg", "--unit", "m", *poses, "--out", ".")
+    assert done.exit_code == 0, done.output
+    path = tmp_path / "mine.scenario.yaml"
+    assert 'file: "hall.svg"' in path.read_text()
+    assert load_scenario(path).workspace.polygon.area == pytest.approx(60.0)
+
+
 REFUSED = {
     "one robot": (["--robots", 1], "--robots: 1 is not allowed; expected two to six"),
     "no arm": (["--arm", "long"], "is no list of lengths"),
@@ -86,6 +97,10 @@ REFUSED = {
     "scale alone": (["--scale", 50], "--scale is for a floor plan"),
     "arm in a wall at the goal": (["--goal", 3.2, 1.0, 0], "mine/mine.scenario.yaml: goal.object: "),
     "layer alone": (["--layer", "walls"], "--layer is for a floor plan"),
+    "no such plan": (
+        ["--floor-plan", "hall.svg", "--start", 1, 1, 0, "--goal", 2, 1, 0],
+        "/hall.svg' is not allowed; expected a file that exists",
+    ),
     "in a wall": (["--start", 0, 0, 0], "mine/mine.scenario.yaml: start: "),
 }
 

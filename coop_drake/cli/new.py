@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import sys
 import tempfile
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -201,18 +202,21 @@ def _write(starter: Starter, folder: Path, reporter: Reporter, *, force: bool) -
     for name in files:
         if (folder / name).exists() and not force:
             raise ScenarioError(str(folder / name), "--out", str(folder), "an empty folder, or --force")
-    folder.parent.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory(dir=folder.parent, prefix=f".{folder.name}.") as draft:
+    place = folder.resolve()  # That of "." has a parent and a name.
+    place.parent.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(dir=place.parent, prefix=f".{place.name}.") as draft:
         for name, text in files.items():
             (Path(draft) / name).write_text(text, encoding="utf-8")
+        path = Path(draft) / f"{starter.name}.scenario.yaml"
         try:
             with reporter.stage("checking"):
-                path = Path(draft) / f"{starter.name}.scenario.yaml"
+                path.write_text(starter_text(_with_absolute_plan(starter, place)), encoding="utf-8")
                 scenario = load_scenario(path)
                 _refuse_blocked_goal(planning_problem(scenario), path)
         except ScenarioError as error:  # The draft is gone when the message is read.
-            named = error.file.replace(str(Path(draft)), str(folder))
+            named = error.file.replace(draft, str(folder))
             raise ScenarioError(named, error.key, error.value, error.allowed) from error
+        path.write_text(files[path.name], encoding="utf-8")
         folder.mkdir(exist_ok=True)
         for name in files:
             (Path(draft) / name).replace(folder / name)
@@ -222,6 +226,14 @@ def _write(starter: Starter, folder: Path, reporter: Reporter, *, force: bool) -
     reporter.say(f"Written: {', '.join(escape(str(folder / name)) for name in files)}")
     reporter.say(f"Next: coop-drake run {escape(str(file))}")
     return ExitCode.DONE
+
+
+def _with_absolute_plan(starter: Starter, place: Path) -> Starter:
+    """Name the floor plan by its absolute path, which a draft in another folder finds, too."""
+    if starter.workspace is None:
+        return starter
+    file = str((place / str(starter.workspace["file"])).resolve())
+    return replace(starter, workspace={**starter.workspace, "file": file})
 
 
 @new_app.command("object")
