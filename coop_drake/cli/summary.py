@@ -70,8 +70,11 @@ _MORE_ROWS = (
 
 
 def summary_rows(facts: Mapping[str, Any], *, verbose: bool = False) -> list[tuple[str, str]]:
-    """Return label and value of every row whose facts are known; of more rows if ``verbose``."""
-    known = {key: value for key, value in facts.items() if value is not None}
+    """Return label and value of every row whose facts are known; of more rows if ``verbose``.
+
+    Clearances between bodies that are never compared are infinite: they have no row.
+    """
+    known = {key: value for key, value in facts.items() if value not in (None, inf)}
     speeds = facts.get("peak_speeds", ())
     limited = [speed for speed in speeds if speed["limit"]]
     if limited:
