@@ -483,7 +483,7 @@ def check_plan_belongs(plan: Plan, problem: PlanningProblem, path: Path) -> None
             plan.problem == digest,
             repr(plan.problem),
             repr(digest),
-            ": the plan was made for another floor, team or tolerance",
+            ": the plan was made for another floor or team, other tolerances or other limits",
         ),
     )
     for key, same, found, expected, reason in checks:

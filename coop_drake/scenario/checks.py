@@ -4,7 +4,7 @@ Each check yields the faults that it finds as (key, value, what is allowed), so 
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import fields, replace
+from dataclasses import fields
 
 import numpy as np
 from shapely import LineString, Polygon, STRtree
@@ -26,6 +26,9 @@ _LEAST_AREA = 1e-9
 
 _SAMPLED = ("sample_offset", "switch_delay", "silence", "deaf")
 """Departures of single robots that need a control rate."""
+
+_LIMITS_OF_ROBOTS = tuple(key.name for key in fields(RobotLimits) if key.name != "acceleration")
+"""Keys of an entry of ``limits`` that is a robot's."""
 
 
 def validate(scenario: Scenario) -> None:
@@ -82,8 +85,9 @@ def _name_faults(scenario: Scenario, robots: Sequence[str]) -> Faults:
                 stated.acceleration,
                 f"null; only limits.{OBJECT} has this key",
             )
-        if name == OBJECT and replace(stated, acceleration=None) != RobotLimits():
-            yield f"limits.{name}", name, "only the key acceleration"
+        for key in _LIMITS_OF_ROBOTS if name == OBJECT else ():
+            if (value := getattr(stated, key)) != getattr(RobotLimits(), key):
+                yield f"limits.{name}.{key}", value, "nothing; only the limit acceleration is of the object"
     for name in scenario.deployment.robots:
         if name not in (*robots, ALL_ROBOTS):
             known = f'a robot, one of {", ".join(robots)}, or "{ALL_ROBOTS}"'

@@ -67,6 +67,8 @@ def test_a_wrong_value_is_refused_with_its_key_and_what_is_allowed(edit, key, va
         ("{load_shares: {robot_0: 0.5, robot_1: 0.6}}", "load_shares", "shares that sum to 1, not to 1.1"),
         ("{load_shares: {robot_0: -0.5, robot_1: 1.5}}", "load_shares.robot_0", "between 0 and 1"),
         ("{limits: {nobody: {base_speed: 1.0}}}", "limits.nobody", "a robot, one of robot_0, robot_1"),
+        ("{limits: {object: {base_speed: 1.0}}}", "limits.object.base_speed", "only the limit acceleration"),
+        ("{limits: {robot_0: {acceleration: 1.0}}}", "limits.robot_0.acceleration", "only limits.object"),
         ("{simulator: {integration_scheme: euler}}", "simulator.integration_scheme", "one of runge_kutta3"),
         (
             "{gains: {selected: scheduled}\ncontrol: {hold: {silence: 0.1}}}",
