@@ -70,7 +70,7 @@ from coop_drake.planning.motion_step import newton_step
 from coop_drake.tree.arrays import FloatArray, IntArray
 
 SPAN_TIME = 0.3
-"""Time of a span at the speed limits, before the program [s]."""
+"""Time of a span at the speed limits, before the program [s]; longer if ``2 MOST_SPANS`` do not suffice."""
 
 PERIOD = 0.08
 """Time of a span of the motion that is made, about [s]."""
@@ -184,7 +184,7 @@ def cell_sets(plan: Plan, room: FloatArray | float) -> CellSets:
 def first_points(
     plan: Plan, cells: CellSets, chains: Chains, limits: FloatArray, overlap: float
 ) -> FloatArray:
-    """Return control points along the paths of a plan's transitions, three at rest at either end, (m, 3 + n).
+    """Return control points (z, t) along a plan's paths, three at rest at either end, evenly timed, (m, D).
 
     Angles and joints move evenly from the middle of one goal interval to that of the next. Spans are shorter
     where two cells overlap for a short way only, and where there is little clearance.
@@ -212,9 +212,10 @@ def first_points(
     for index, (before, after) in enumerate(pairwise(ways)):
         overlaps.append((_inside(cells, index + 1, before), _inside(cells, index, after)))
     way, clearance = np.concatenate(ways), np.concatenate(clearances)
-    steps, spans = np.diff(way, axis=0), times_at_limits(chains, limits, way) / SPAN_TIME
+    steps, seconds = np.diff(way, axis=0), times_at_limits(chains, limits, way)
+    span_time = max(SPAN_TIME, float(seconds.sum()) / (2 * MOST_SPANS))
     room = np.maximum(np.minimum(clearance[1:], clearance[:-1]), 1e-4)
-    spans = np.maximum(spans, CLEARANCE_SPANS * np.hypot(*steps[:, :2].T) / room)
+    spans = np.maximum(seconds / span_time, CLEARANCE_SPANS * np.hypot(*steps[:, :2].T) / room)
     for index, (reached, left) in enumerate(overlaps):
         middle = (index + 1) * SAMPLES
         begin = middle - 1 - int(np.argmin(np.append(reached[::-1], False)))
@@ -226,9 +227,9 @@ def first_points(
         else:
             spans[piece] = overlap / max(piece.stop - piece.start, 1)
     at = np.append(0.0, np.cumsum(spans))
-    places = np.linspace(0.0, at[-1], max(int(np.ceil(at[-1])) + 1, 5))
-    inner = np.stack([np.interp(places, at, column) for column in way.T], axis=1)
-    return np.concatenate([inner[:1], inner[:1], inner, inner[-1:], inner[-1:]])
+    places = np.pad(np.linspace(0.0, at[-1], max(int(np.ceil(at[-1])) + 1, 5)), 2, mode="edge")
+    columns = [np.interp(places, at, column) for column in way.T]
+    return np.column_stack([*columns, span_time * (np.arange(len(places)) - 1.0)])
 
 
 def _inside(cells: CellSets, index: int, way: FloatArray) -> NDArray[np.bool_]:
@@ -375,7 +376,6 @@ def quickest_motion(
     free = np.where([True, True, False], table, inf)  # Jerk is limited where spans are about equal.
     for finer in range(FINER + 1):
         points = first_points(plan, cells, chains, table, OVERLAP_SPANS * 2**finer)
-        points = np.column_stack([points, SPAN_TIME * (np.arange(len(points)) - 1.0)])
         try:
             last = _Program(cells, chains, free, waiting, points, EVENNESS, parts=1)
             break

@@ -13,9 +13,16 @@ from coop_drake.answers.motion import WAITING
 from coop_drake.answers.plan import Cell
 from coop_drake.laws import ScheduledGains
 from coop_drake.planning.duration import plan_time, timed
-from coop_drake.planning.motion import BRAKE_RAMP, quickest_motion
+from coop_drake.planning.motion import BRAKE_RAMP, MOST_SPANS, cell_sets, first_points, quickest_motion
 from coop_drake.planning.motion_barrier import Slopes
-from coop_drake.planning.motion_limits import base_chains, base_places, follow, motion_limits
+from coop_drake.planning.motion_limits import (
+    base_chains,
+    base_places,
+    follow,
+    motion_limits,
+    team_chains,
+    times_at_limits,
+)
 from coop_drake.planning.motion_step import newton_step
 from coop_drake.planning.transitions import share_speeds
 from coop_drake.plant import planning_problem
@@ -82,6 +89,16 @@ def test_cells_are_left_one_after_the_other_where_several_hold_the_end() -> None
     assert len(motion.windows) == len(cells)
     assert (np.diff(motion.windows, axis=0) > 0.0).all()
     assert motion.windows[-1, 1] == pytest.approx(motion.duration)
+
+
+def test_the_initial_path_of_a_very_slow_team_has_few_points() -> None:
+    scenario, plan = small_motion()
+    problem = planning_problem(scenario)
+    cells, chains, limits = cell_sets(plan, 0.0), team_chains(problem), motion_limits(problem.limits)
+    points = first_points(plan, cells, chains, 1e-3 * limits, 2.0)
+    assert len(points) < 3 * MOST_SPANS  # 8687 without a bound
+    seconds = times_at_limits(chains, 1e-3 * limits, points[:, :-1]).sum()
+    assert seconds <= points[-2, -1] <= 2.0 * seconds
 
 
 def test_it_begins_and_ends_at_rest(case: Case) -> None:
