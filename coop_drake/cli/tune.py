@@ -29,6 +29,12 @@ _TUNED = "tuned"
 _PATIENCE = 2.0
 """A trial is ended when it takes this many times as long as before, or as a limit allows [-]."""
 
+_RESTS = (
+    "gains are tuned for a team that rests in every cell, from those of --gains scheduled: a team that "
+    "passes from cell to cell, as this scenario's does, has none to tune"
+)
+"""What is said where the scenario selects no gain set."""
+
 EXAMPLES = (
     ("tune models/base.scenario.yaml", "less force in no more time, into out/base/tuned/gains.yaml"),
     (
@@ -97,8 +103,9 @@ def tune_command(
     wanted = criteria or ["peak_force"], ["time<=1x"] if limits is None else limits
     weights, kept = read_weights(wanted[0]), tuple(map(Limit.parse, wanted[1]))
     task = read_task(scenario, gains, reporter)
-    if task.scenario.passes:  # Its motion has no gain set to tune; a team that rests in every cell has one.
-        task = read_task(scenario, SCHEDULED, reporter)
+    if task.scenario.passes:
+        reporter.note([_RESTS])
+        task = read_task(scenario, SCHEDULED)
     start = task.scenario.gain_sets[task.scenario.selected_gains]
     parameters = tunable_parameters(start, vary or ())
     folder = ResultFolder.of(task.name, out, "plan", "tuning", below=_TUNED)

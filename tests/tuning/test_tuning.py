@@ -311,6 +311,7 @@ def test_ctrl_c_leaves_the_best_so_far(room, tmp_path, monkeypatch):
     result = called(room, "--workers", 1, "--out", tmp_path)
     assert result.exit_code == 130
     assert "Not verified: interrupted after 0 trials" in (tmp_path / "gains.yaml").read_text()
+    assert "tuned for a team that rests in every cell" in " ".join(result.output.split())
 
 
 @pytest.mark.parametrize(
