@@ -152,7 +152,9 @@ def test_the_log_of_a_run_is_verified_and_an_altered_one_refused(finished, room,
     refused = invoke("verify", tmp_path / "log.npz", room, "--plan", out / "plan.json", "--json")
     assert refused.exit_code == 1
     assert json.loads(refused.stdout)["where"].startswith("object_pose, joints[20, ")
-    assert invoke("verify", tmp_path / "log.npz", room, "--quiet").exit_code == 2  # no plan beside it
+    alone = invoke("verify", tmp_path / "log.npz", room, "--quiet")
+    assert alone.exit_code == 2
+    assert "expected the plan of the log, or --plan FILE" in " ".join(alone.output.split())
 
 
 def test_people_see_bars_and_a_table_and_quiet_shows_nothing(room, tmp_path):

@@ -12,7 +12,7 @@ from rich.markup import escape
 from coop_drake.cli.options import ScenarioPath
 from coop_drake.cli.reporter import ExitCode, Reporter
 from coop_drake.cli.task import read_task
-from coop_drake.errors import RefusalError
+from coop_drake.errors import PlanError, RefusalError
 
 if TYPE_CHECKING:
     from coop_drake.verification import Check
@@ -67,10 +67,10 @@ def verify_command(
             if certificate.suffix == ".npz":
                 from coop_drake.chain import verify_run
 
-                beside = certificate.with_name("plan.json")
-                verified = verify_run(
-                    certificate, plan or beside, task.scenario, braked=braked, progress=progress
-                )
+                followed = plan or certificate.with_name("plan.json")
+                if plan is None and not followed.exists():
+                    raise PlanError(f"{followed}: no such file; expected the plan of the log, or --plan FILE")
+                verified = verify_run(certificate, followed, task.scenario, braked=braked, progress=progress)
             else:
                 from coop_drake.plant.facts import scenario_budgets
                 from coop_drake.verification import verify_file
