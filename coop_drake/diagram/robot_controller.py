@@ -19,7 +19,7 @@ from coop_drake.harmonic_maps import HarmonicMap, VelocityField
 from coop_drake.laws.governor import FIELD_SPEED, slowdown_radius
 from coop_drake.laws.measurements import observer_gains, whole_periods
 from coop_drake.laws.readiness import ArrivalGoal
-from coop_drake.laws.words import CLOCK_ERROR, WORD_PERIOD, Schedule, schedule_of
+from coop_drake.laws.words import CLOCK_ERROR, ROUNDING, WORD_PERIOD, Schedule, schedule_of
 from coop_drake.plant import ObjectInertia, RobotPlant, TeamPlant, base_chain, build_robot_plant, robot_chain
 from coop_drake.plant.team import RobotModel
 from coop_drake.robustness.tracking import unknown_time
@@ -159,6 +159,7 @@ def team_schedule(scenario: Scenario, plan: Plan) -> Schedule | None:
 
     Raises:
         ScenarioError: Words may be later than the plan's motion allows.
+        PlanError: The motion's cells make no schedule: two overlap too shortly for wrong clocks, for example.
     """
     motion, deployment = plan.motion, scenario.deployment
     if motion is None:
@@ -167,19 +168,23 @@ def team_schedule(scenario: Scenario, plan: Plan) -> Schedule | None:
     if plan.budget is not None:
         eps = plan.budget.clock_error
     delay = 0.5 * motion.waiting - 2.0 * eps - 2.0 * period
-    if delay < 0.0:
+    if delay < -ROUNDING:
         allowed = f"at least {4.0 / (motion.waiting - 4.0 * eps):.6g} Hz, for words of the plan's motion"
         raise ScenarioError(str(scenario.path), "deployment.control_rate", deployment.control_rate, allowed)
+    delay = max(delay, 0.0)
     if deployment.messages.delay > delay:
         allowed = f"at most {delay:.6g} s: the plan's motion waits no longer for words"
         raise ScenarioError(
             str(scenario.path), "deployment.messages.delay", deployment.messages.delay, allowed
         )
     begins, ends = motion.windows[:, 0], motion.windows[:, 1]
-    return schedule_of(
-        begins, begins, begins[:-1] + motion.waiting, ends, ramp=motion.ramp, start_rate=motion.start_rate,
-        period=period, delay=delay, clock_error=eps,
-    )  # fmt: skip
+    try:
+        return schedule_of(
+            begins, begins, begins[:-1] + motion.waiting, ends, ramp=motion.ramp, period=period,
+            start_rate=motion.start_rate, delay=delay, clock_error=eps,
+        )  # fmt: skip
+    except ValueError as error:
+        raise PlanError(f"the plan's motion: {error}") from error
 
 
 def governed_cells(plan: Plan, maps: Sequence[HarmonicMap]) -> list[GovernedCell]:

@@ -180,6 +180,7 @@ class _Question:
                 roomy = _with_room(self._plan(room), room[0])
                 plan = with_gains(roomy, self.gain_set, self.gain_set_name)
                 motion = quickest_motion(plan, self.problem, kept, gains, waiting, room[1:])
+                _check_overlaps(motion, budget)
             except (GeometryError, PlanError, StallError, ShapelyError, np.linalg.LinAlgError) as error:
                 sizes = f"{1e3 * room[0]:.0f} mm and {1e3 * room[1:].max():.0f} mrad or mm"
                 return f"with room for departures of {sizes}, {error}"
@@ -242,6 +243,21 @@ def _least_departures(
         name, limit = team.efforts.names[worst], team.efforts.limits[worst]
         return f"{name} may be told to give {asked[worst]:.4g}; its limit is {limit:g}"
     return gains, replace(best, effort=asked)
+
+
+def _check_overlaps(motion: Motion, budget: Budget) -> None:
+    """Refuse a motion that lies in two cells at once for less than phases of robots may differ by.
+
+    Raises:
+        PlanError: Names the cells.
+    """
+    overlaps, least = motion.windows[:-1, 1] - motion.windows[1:, 0], 2.0 * budget.clock_error
+    if (overlaps < least).any():
+        k = int(np.argmin(overlaps))
+        raise PlanError(
+            f"cells {k} and {k + 1} overlap for {overlaps[k]:.3g} s, and by wrong clocks robots may differ "
+            f"by {least:g} s"
+        )
 
 
 # Regions without their outer strip, and paths in them.

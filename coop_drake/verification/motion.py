@@ -28,6 +28,7 @@ from coop_drake.answers.plan import Plan
 from coop_drake.answers.problem import PlanningProblem
 from coop_drake.errors import RefusalError
 from coop_drake.laws import GainSet, ScheduledGains
+from coop_drake.laws.words import CLOCK_ERROR
 from coop_drake.robustness.tracking import speed_departures
 from coop_drake.tree.arrays import FloatArray, IntArray
 from coop_drake.verification.budget import check_shapes
@@ -72,7 +73,7 @@ def check_motion(plan: Plan, problem: PlanningProblem, gain_set: GainSet) -> lis
     if not problem.limits.base_components:
         raise RefusalError("motion", "is stated, but the problem does not say where the bases are")
     _check_ends(plan, motion, problem)
-    windows = _windows(motion)
+    windows = _windows(motion, 2.0 * (CLOCK_ERROR if plan.budget is None else plan.budget.clock_error))
     if plan.budget is None:  # Otherwise gains are a free choice, from which departures follow.
         _check_pull(motion, gain_set)
     room, noisy = np.zeros(len(plan.start) - 2), NO_NOISE
@@ -131,13 +132,17 @@ def _axis(plan: Plan, axis: int) -> str:
     return ("theta", *plan.joint_names)[axis]
 
 
-def _windows(motion: Motion) -> FloatArray:
-    """Return the windows in spans; refuse windows that do not follow each other from beginning to end."""
+def _windows(motion: Motion, overlap: float) -> FloatArray:
+    """Return the windows in spans; refuse windows that do not follow each other from beginning to end.
+
+    Neighbours overlap for at least as long as phases of robots may differ by wrong clocks [s].
+    """
     windows, duration, before = motion.windows, motion.duration, (0.0, inf)
     for i, (tau, x) in enumerate(windows.tolist()):
         where = f"motion.windows[{i}]"
-        if not (tau == 0.0 if i == 0 else before[0] < tau < before[1]):
-            allowed = "0 s" if i == 0 else f"a time after {before[0]} and before {before[1]} s"
+        latest = before[1] - overlap
+        if not (tau == 0.0 if i == 0 else before[0] < tau <= latest + SAME):
+            allowed = "0 s" if i == 0 else f"a time after {before[0]} and not after {latest} s"
             raise RefusalError(where, f"begins at {tau} s; expected {allowed}")
         after = tau if i == 0 else max(tau, before[1])
         if not (tau < duration * (1.0 - RELATIVE) and after < x <= duration * (1.0 + RELATIVE)):

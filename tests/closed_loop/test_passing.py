@@ -9,15 +9,15 @@ import pytest
 from pydrake.systems.framework import Context, DiscreteValues
 from scipy.interpolate import BSpline
 
-from coop_drake import load_scenario
+from coop_drake import Found, load_scenario, plan
 from coop_drake.answers.log import SimulationLog
 from coop_drake.answers.plan import Plan
 from coop_drake.answers.problem import PlanningProblem
 from coop_drake.cli.summary import simulation_facts
 from coop_drake.diagram import RobotKnowledge, build_closed_loop
 from coop_drake.diagram.robot_controller import team_schedule
-from coop_drake.errors import RefusalError, ScenarioError
-from coop_drake.laws.words import ASKS, WORD_SIZE
+from coop_drake.errors import PlanError, RefusalError, ScenarioError
+from coop_drake.laws.words import ASKS, CLOCK_ERROR, WORD_SIZE
 from coop_drake.planning.motion_limits import largest_forces
 from coop_drake.plant.facts import run_setup
 from coop_drake.scenario import (
@@ -33,7 +33,7 @@ from coop_drake.scenario import (
     Silence,
 )
 from coop_drake.scenario.checks import validate
-from coop_drake.scenario.model import RobotLimits
+from coop_drake.scenario.model import RobotLimits, Tolerances
 from coop_drake.simulation import build_maps, simulate
 from coop_drake.systems.words import SAID, RobotWords
 from coop_drake.verification.motion import _movers
@@ -243,6 +243,44 @@ def test_words_that_are_later_than_the_motion_allows_are_refused() -> None:
     for deployment, key in ((late, r"messages\.delay"), (Deployment(control_rate=20.0), "control_rate")):
         with pytest.raises(ScenarioError, match=rf"deployment\.{key}"):
             team_schedule(replace(scenario, deployment=deployment), with_motion(plan))
+
+
+def test_words_may_be_exactly_as_late_as_the_motion_allows() -> None:
+    scenario, plan = small_problem("base")
+    plan = with_motion(plan)
+    assert plan.motion is not None
+    sampled = replace(scenario, deployment=Deployment(control_rate=150.0))
+    waiting = 4.0 * (CLOCK_ERROR + 1.0 / 150.0)
+    exact = replace(plan, motion=replace(plan.motion, waiting=waiting))
+    assert 0.5 * waiting - 2.0 * CLOCK_ERROR - 2.0 / 150.0 < 0.0  # by rounding
+    schedule = team_schedule(sampled, exact)
+    assert schedule is not None
+    assert schedule.window == pytest.approx(0.5 * waiting)
+    shorter = replace(plan, motion=replace(plan.motion, waiting=0.99 * waiting))
+    with pytest.raises(ScenarioError, match="control_rate"):
+        team_schedule(sampled, shorter)
+
+
+def test_cells_of_a_plan_with_a_budget_overlap_for_as_long_as_clocks_may_differ() -> None:
+    clocks = Deployment(control_rate=200.0, clock_error=0.025, budget="all")
+    goal = replace(load_scenario("warehouse").goal, tolerances=Tolerances(position=0.1, angle=0.1))
+    scenario = replace(load_scenario("warehouse"), deployment=clocks, goal=goal)
+    found = plan(scenario)
+    assert isinstance(found, Found)
+    assert found.plan.motion is not None
+    windows = found.plan.motion.windows
+    assert (windows[:-1, 1] - windows[1:, 0] >= 2.0 * 0.025).all()
+    assert team_schedule(scenario, found.plan) is not None
+
+
+def test_a_motion_that_makes_no_schedule_is_refused() -> None:
+    scenario, plan = small_problem("base")
+    plan = with_motion(plan)
+    assert plan.motion is not None
+    windows = plan.motion.windows.copy()
+    windows[0, 1] = windows[1, 0] + 1.9 * CLOCK_ERROR
+    with pytest.raises(PlanError, match="must overlap for at least"):
+        team_schedule(scenario, replace(plan, motion=replace(plan.motion, windows=windows)))
 
 
 @pytest.mark.parametrize(

@@ -175,6 +175,9 @@ ALTERED = {
         lambda m: {"windows": m.windows[[0, 1, 3, 2, *range(4, len(m.windows))]]}, r"motion\.windows\[[23]\]"
     ),
     "a gap between windows": (lambda m: moved_window(m, 5, 0, m.windows[4, 1]), r"motion\.windows\[5\]"),
+    "windows that overlap for less than clocks differ": (
+        lambda m: moved_window(m, 5, 0, m.windows[4, 1] - 0.0039), r"motion\.windows\[5\]: begins",
+    ),
     "two begin together": (lambda m: moved_window(m, 5, 0, m.windows[4, 0]), r"motion\.windows\[5\]"),
     "left before the one before it": (
         lambda m: moved_window(m, 5, 1, m.windows[4, 1]),
