@@ -60,14 +60,18 @@ class TeamLimits:
         """Whether there is a limit of a speed or rate."""
         return bool(np.isfinite(np.concatenate((self.base_speeds, self.turn_rates, self.joint_rates))).any())
 
-    def with_defaults(self) -> TeamLimits:
-        """Return the limits of a team that passes from cell to cell: usual ones where nothing is stated."""
+    def with_defaults(self, joints: int | None = None) -> TeamLimits:
+        """Return the limits of a team that passes from cell to cell: usual ones where nothing is stated.
+
+        Args:
+            joints: Number of joints, for a team of which no joint states anything.
+        """
 
         def known(stated: FloatArray, count: int, otherwise: float) -> FloatArray:
             stated = stated if stated.size else np.full(count, np.inf)
             return np.where(np.isfinite(stated), stated, otherwise)
 
-        bases, joints = len(self.base_components), len(self.joint_rates)
+        bases, joints = len(self.base_components), joints or len(self.joint_rates)
         return replace(
             self,
             base_speeds=known(self.base_speeds, bases, motion.BASE_SPEED),
@@ -169,7 +173,7 @@ class PlanningProblem:
     @property
     def kept_limits(self) -> TeamLimits:
         """The limits that the team keeps: those that are known, and usual ones where it passes."""
-        return self.limits.with_defaults() if self.passes else self.limits
+        return self.limits.with_defaults(len(self.tree.joints)) if self.passes else self.limits
 
     def __post_init__(self) -> None:
         """Give room to joints at their limits."""

@@ -175,9 +175,8 @@ def _warn_of_limits(reporter: Reporter) -> None:
     Nobody may care how fast bases turn.
     """
     speeds = reporter.facts["peak_speeds"]
-    if over := beyond_limits(reporter.facts):
-        said = escape("; ".join(over))
-        reporter.say(f"[yellow]Limits were exceeded: {said}; `verify` refuses the log where speeds were[/]")
+    if exceeded := beyond_limits(reporter.facts):
+        reporter.say(f"[yellow]{escape(exceeded)}[/]")
     unknown = [s["name"] for s in speeds if s["limit"] is None and not s["name"].startswith("turn rate")]
     if unknown:
         names = escape(", ".join(unknown))

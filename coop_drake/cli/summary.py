@@ -95,10 +95,15 @@ def _beside_limit(speed: Mapping[str, Any]) -> str:
     return f"{speed['peak']:.2f} {speed['unit']}, {limit}"
 
 
-def beyond_limits(facts: Mapping[str, Any]) -> list[str]:
-    """Return each speed, acceleration or effort of a run that exceeded its limit, beside this limit."""
+def beyond_limits(facts: Mapping[str, Any]) -> str:
+    """Return which limit a run exceeded most, and how many others, in a sentence; empty for none."""
     over = [one for one in facts["peak_speeds"] if one["limit"] and one["peak"] > one["limit"]]
-    return [f"{one['name']}, {one['peak']:.6g} {one['unit']}, limit {one['limit']:g}" for one in over]
+    if not over:
+        return ""
+    most = max(over, key=lambda one: one["peak"] / one["limit"])
+    others = f", and {len(over) - 1} other{'s' * (len(over) > 2)}, see --verbose" if len(over) > 1 else ""
+    said = f"{most['name']}, {most['peak']:.6g} {most['unit']}, limit {most['limit']:g}"
+    return f"A limit was exceeded: {said}{others}"
 
 
 def process_lines(facts: Mapping[str, Any]) -> list[str]:
@@ -173,7 +178,7 @@ def plan_facts(plan: Plan) -> dict[str, Any]:
         "estimated_seconds": plan.motion.run_time
         if plan.motion
         else sum(transition.estimated_time for transition in plan.transitions),
-        "gains": plan.gain_set,
+        "gains": None if plan.motion else plan.gain_set,
     }
 
 

@@ -395,7 +395,7 @@ def quickest_motion(
                     raise
                 continue
             last.solve(weights)
-            if not last.uniform or last.slow_down() < MUCH_SLOWER or longest > PERIOD:
+            if not last.uniform or last.slow_down() < MUCH_SLOWER:
                 break
     if not (np.diff(last.windows[:, 1]) > 0.0).all():
         raise PlanError("a cell is not left after the one before it")

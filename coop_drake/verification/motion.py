@@ -22,8 +22,7 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from coop_drake.answers import motion as defaults
-from coop_drake.answers.motion import WAITING, Motion
+from coop_drake.answers.motion import GRAVITY, WAITING, Motion, pull_gains
 from coop_drake.answers.plan import Plan
 from coop_drake.answers.problem import PlanningProblem
 from coop_drake.errors import RefusalError
@@ -119,10 +118,8 @@ def _check_ends(plan: Plan, motion: Motion, problem: PlanningProblem) -> None:
 def _check_pull(motion: Motion, gain_set: GainSet) -> None:
     """Check the gains with which robots are pulled to the motion, by the age of commands."""
     age = gain_set.age if isinstance(gain_set, ScheduledGains) else 0.0
-    largest = defaults.LARGEST_DAMPING
-    damping = largest if age == 0.0 else min(largest, defaults.AGE_PHASE / age)
-    for i, found in enumerate(motion.gains):
-        for k, expected in enumerate((0.25 * damping**2, damping)):
+    for i, (found, due) in enumerate(zip(motion.gains, pull_gains(age), strict=True)):
+        for k, expected in enumerate(due):
             if not abs(found[k] - expected) <= RELATIVE * expected:
                 finding = f"is {found[k]}; commands {age:g} s old give {expected}"
                 raise RefusalError(f"motion.gains[{i}][{k}]", finding)
@@ -387,30 +384,23 @@ def _movers(problem: PlanningProblem, noisy: FloatArray = NO_NOISE) -> Iterator[
     """
     bases = len(problem.limits.base_components)
     noisy = noisy if noisy.size else np.zeros(2 * bases + len(problem.tree.joints))
-    of, joints = problem.limits, problem.tree.joints
+    joints = problem.tree.joints
+    of = problem.limits.with_defaults(len(joints))
     unit = np.eye(3 + len(joints))
-
-    def known(stated: FloatArray, index: int, default: float) -> float:
-        return float(stated[index]) if stated.size and np.isfinite(stated[index]) else default
-
-    most = known(of.object_acceleration, 0, defaults.OBJECT_ACCELERATION)
-    yield _Mover("the object", "m", inf, most, unit[:2])
+    yield _Mover("the object", "m", inf, float(of.object_acceleration[0]), unit[:2])
     for k, (component, point) in enumerate(zip(of.base_components, of.base_points, strict=True)):
         stages = component_stages(problem.tree, component)
-        speed = known(of.base_speeds, k, defaults.BASE_SPEED) - noisy[k]
-        most = known(of.base_accelerations, k, defaults.BASE_ACCELERATION)
-        jerk = known(of.base_jerks, k, defaults.BASE_JERK)
-        yield _Mover(f"base {k}", "m", speed, most, None, jerk, ((1.0, stages, point),))
-        yield from _centre(
-            problem, k, known(of.frictions, k, defaults.FRICTION), known(of.base_forces, k, inf)
+        most, jerk, turning = (
+            float(each[k]) for each in (of.base_accelerations, of.base_jerks, of.turn_accelerations)
         )
-        speed = known(of.turn_rates, k, defaults.TURN_RATE) - noisy[bases + k]
-        most = known(of.turn_accelerations, k, defaults.TURN_ACCELERATION)
+        speed, rate = float(of.base_speeds[k] - noisy[k]), float(of.turn_rates[k] - noisy[bases + k])
+        yield _Mover(f"base {k}", "m", speed, most, None, jerk, ((1.0, stages, point),))
+        yield from _centre(problem, k, float(of.frictions[k]), float(of.base_forces[k]))
         signs = [stage.sign * unit[3 + stage.index] for stage in stages if stage.kind == "revolute"]
-        yield _Mover(f"the angle of base {k}", "rad", speed, most, np.sum(signs, axis=0, keepdims=True))
-    for joint in joints:
-        speed = known(of.joint_rates, joint.index, defaults.JOINT_RATE) - noisy[2 * bases + joint.index]
-        most = known(of.joint_accelerations, joint.index, defaults.JOINT_ACCELERATION)
+        yield _Mover(f"the angle of base {k}", "rad", rate, turning, np.sum(signs, axis=0, keepdims=True))
+    for joint, speed, most in zip(
+        joints, (of.joint_rates - noisy[2 * bases :]).tolist(), of.joint_accelerations.tolist(), strict=True
+    ):
         yield _Mover(joint.name, joint.unit, speed, most, unit[[3 + joint.index]])
 
 
@@ -421,7 +411,7 @@ def _centre(problem: PlanningProblem, k: int, friction: float, force: float) -> 
         points = tuple(
             (one / mass, component_stages(problem.tree, int(on)), (x, y)) for on, one, x, y, *_ in held
         )
-        most = min(friction * defaults.GRAVITY, force / mass)
+        most = min(friction * GRAVITY, force / mass)
         yield _Mover(f"the centre of all that base {k} moves", "m", inf, most, None, points=points)
 
 

@@ -23,7 +23,7 @@ from coop_drake.answers.speeds import base_speeds, steadiness
 from coop_drake.drawing import canvas
 from coop_drake.drawing.colours import BLUE, GREEN, GREY, INK, OBJECT, OUTSIDE, SKY, robot_colour
 from coop_drake.files import write_atomically
-from coop_drake.planning.motion_limits import largest_forces, motion_limits
+from coop_drake.planning.motion_limits import largest_forces
 from coop_drake.tree.arrays import FloatArray
 from coop_drake.tree.component_tree import ComponentTree
 from coop_drake.verification.runs.bodies import component_stages, moved
@@ -247,11 +247,17 @@ def break_at_switches(log: SimulationLog, values: FloatArray) -> tuple[FloatArra
 
 
 def position_figure(log: SimulationLog) -> Figure:
-    """Draw the object's position and the reference governor's over time."""
-    caption = "Figure 6. Position of the object, and of the reference governor that leads it."
-    figure, axes = time_axes(log, caption, ["x [m]", "y [m]"])
+    """Draw the object's position and that of the reference governor, or of the motion, over time."""
+    name, leads = (
+        ("motion", "motion that it follows")
+        if log.phases.size
+        else ("governor", "reference governor that leads it")
+    )
+    figure, axes = time_axes(
+        log, f"Figure 6. Position of the object, and of the {leads}.", ["x [m]", "y [m]"]
+    )
     for axis, ax in enumerate(axes):
-        ax.plot(log.times, log.governor_position[:, axis], color=GREY, linewidth=0.9, label="governor")
+        ax.plot(log.times, log.governor_position[:, axis], color=GREY, linewidth=0.9, label=name)
         ax.plot(log.times, log.object_pose[:, axis], color=OBJECT, label="object")
     canvas.legend_above(axes[0])
     return figure
@@ -362,11 +368,10 @@ def _limits_in(
     Those of the bases have the shape (N,), infinity for none [m/s, m/s^2, N, m/s^2].
     """
     of, robots = problem.limits, len(log.robot_names)
-    speeds, accelerations, forces = of.base_speeds, of.base_accelerations, of.base_forces
-    of_object = of.object_acceleration
+    forces = of.base_forces
     if log.phases.size:
-        kept, forces = motion_limits(of), largest_forces(of)
-        of_object, speeds, accelerations = kept[:1, 1], kept[1 : 1 + robots, 0], kept[1 : 1 + robots, 1]
+        of, forces = of.with_defaults(), largest_forces(of)
+    speeds, accelerations, of_object = of.base_speeds, of.base_accelerations, of.object_acceleration
     unknown = np.full(robots, inf)
     speeds, accelerations, forces = (
         each if each.size else unknown for each in (speeds, accelerations, forces)
