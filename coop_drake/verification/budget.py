@@ -66,10 +66,20 @@ def check_departures(plan: Plan, problem: PlanningProblem) -> list[Check]:
     due = stated_departures(loop, moving, team.couplings, stated.pull)
     for name in (field.name for field in fields(Departures) if field.name not in ("pull", "effort")):
         _require(getattr(stated, name), getattr(due, name), f"departures.{name}")
+    off = np.array([
+        np.hypot(*(motion.points[-1, :2] - plan.goal_pose[:2])),
+        *(
+            0.0 if goal is None else abs(end - goal)
+            for end, goal in zip(motion.points[-1, 2:], (plan.goal_pose[2], *plan.goal_joints), strict=True)
+        ),
+    ])  # fmt: skip
     tolerances = goal_tolerances(problem)
-    if not (stated.rest <= tolerances).all():
-        channel = int(np.argmax(stated.rest / tolerances))
-        finding = f"is {stated.rest[channel]:.6g}; the goal's tolerance is {tolerances[channel]:g}"
+    if not (off + stated.rest <= tolerances + ROUNDING).all():
+        channel = int(np.argmax((off + stated.rest) / tolerances))
+        finding = (
+            f"is {stated.rest[channel]:.6g}, and the motion ends {off[channel]:.6g} from the goal; its "
+            f"tolerance is {tolerances[channel]:g}"
+        )
         raise RefusalError(f"departures.rest[{channel}]", finding)
     least = _check_regions(plan, float(stated.room[0]))
     checks = [

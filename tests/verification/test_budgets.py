@@ -113,3 +113,14 @@ def test_a_goal_nearer_than_the_team_rests_is_refused(base):
     plan, problem, gains = base
     narrow = replace(problem, position_tolerance=1e-3)
     assert refusal(plan, narrow, gains).startswith("departures.rest[0]")
+
+
+def test_where_the_motion_ends_and_how_far_the_team_rests_from_it_share_the_tolerance_of_the_goal(base):
+    plan, problem, gains = base
+    rest, off = float(plan.departures.rest[0]), 1e-3
+    moved = replace(plan, goal_pose=plan.goal_pose + np.array([off, 0.0, 0.0]))
+    said = refusal(moved, replace(problem, position_tolerance=0.99 * (off + rest)), gains)
+    assert said.startswith(f"departures.rest[0]: is {rest:.6g}, and the motion ends 0.001 from the goal")
+    enough = replace(problem, position_tolerance=1.01 * (off + rest))
+    check_motion(moved, enough, gains)
+    check_departures(moved, enough)
