@@ -107,8 +107,8 @@ class LoopNominal(NamedTuple):
         levels: Of the robots' monitors, see ``largest_departure``, shape (5,) or (0,).
         unseen: t there [s].
         axis_alarms: Levels of all axes, of their rates and of where both take them, (3, M) or (3, 0).
-        stated: Largest departures from the motion of the position, theta and q that the budget states, then
-            those of their rates, shape (2, 2 + n) or (0, 0) [m, rad, and per s].
+        stated: Largest departures from the motion of the position, theta and q by the budget, then
+            those of their rates, see ``allowed_departures``, shape (2, 2 + n) or (0, 0) [m, rad, and per s].
     """
 
     schedule: Schedule
@@ -345,7 +345,8 @@ class WatchRoom(NamedTuple):
         vertices: Room for the vertices in W, shape (V, 2) [m].
         discs: Room for the discs in W, shape (P, 3) [m].
         nominal: Where every robot's motion is, see ``motion_at``, shape (N, 3, 3 + n).
-        off: Departures from the mean of these, and of rates, shape (2, 3 + n).
+        off: Departures from the mean of these, and of rates, and how far this mean moves in the largest error
+            of a clock, shape (3, 3 + n).
     """
 
     z: FloatArray
@@ -368,5 +369,5 @@ def watch_room(plant: LoopPlant) -> WatchRoom:
     return WatchRoom(
         np.empty(n), np.full(n, np.nan), np.full(4, np.nan), np.full(2 * plant.bases.size - 1, np.nan),
         np.zeros(2), np.full((len(shapes.pieces), 2), np.nan), np.full((len(shapes.pairs), 2), np.nan),
-        *shapes.room(), np.empty((plant.bases.size - 1, 3, n)), np.empty((2, n)),
+        *shapes.room(), np.empty((plant.bases.size - 1, 3, n)), np.empty((3, n)),
     )  # fmt: skip

@@ -29,6 +29,7 @@ from coop_drake.plant import (
     read_team_tree,
     robot_chain,
 )
+from coop_drake.robustness.tracking import allowed_departures
 from coop_drake.scenario import Scenario
 from coop_drake.simulation.clearance import TeamClearance
 from coop_drake.simulation.run import PATIENCE_ALLOWANCE, patience
@@ -219,7 +220,9 @@ def _plant(scenario: Scenario, team: TeamPlant, tree: ComponentTree, models: Loo
 
 def _nominal(plan: Plan, team: TeamPlant, knowledge: Sequence[RobotKnowledge]) -> LoopNominal:
     """Return the nominal motion; its schedule follows from the control rate of a run."""
-    motion, away = plan.motion, plan.departures
+    motion, stated = plan.motion, np.empty((0, 0))
+    if motion is not None and plan.budget is not None and plan.departures is not None:
+        stated = allowed_departures(motion, plan.budget, plan.departures)
     monitored = [known.monitored for known in knowledge if known.monitored is not None]
     return LoopNominal(
         NO_SCHEDULE,
@@ -231,5 +234,5 @@ def _nominal(plan: Plan, team: TeamPlant, knowledge: Sequence[RobotKnowledge]) -
         monitored[0].levels if monitored else np.empty(0),
         monitored[0].unseen if monitored else 0.0,
         np.concatenate([np.empty((3, 0)), *(one.axis_alarms for one in monitored)], axis=1),
-        np.empty((0, 0)) if away is None else np.array([away.position, away.rate]),
+        stated,
     )

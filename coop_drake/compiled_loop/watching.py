@@ -207,11 +207,15 @@ def watch(
                     place += room.nominal[k, 0, i] / robots
                     rate += room.nominal[k, 1, i] / robots
                 room.off[0, i], room.off[1, i] = z[i] - place, memory.state[team.places[1, i]] - rate
+                room.off[2, i] = nominal.schedule.clock_error * rate
             used = 0.0
             for row in range(2):
-                used = max(used, hypot(room.off[row, 0], room.off[row, 1]) / nominal.stated[row, 0])
+                moved = hypot(room.off[2, 0], room.off[2, 1]) if row == 0 else 0.0
+                away = hypot(room.off[row, 0], room.off[row, 1])
+                used = max(used, away / (nominal.stated[row, 0] + moved))
                 for i in range(2, z.size):
-                    used = max(used, abs(room.off[row, i]) / nominal.stated[row, i - 1])
+                    moved = abs(room.off[2, i]) if row == 0 else 0.0
+                    used = max(used, abs(room.off[row, i]) / (nominal.stated[row, i - 1] + moved))
             if not figures[SHARE] > used:
                 figures[SHARE] = used
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from math import inf, pi
+from math import hypot, inf, pi
 
 import numpy as np
 from pydrake.systems.framework import Diagram, DiagramBuilder, LeafSystem, OutputPort
@@ -22,7 +22,7 @@ from coop_drake.laws.readiness import ArrivalGoal
 from coop_drake.laws.words import CLOCK_ERROR, ROUNDING, WORD_PERIOD, Schedule, schedule_of
 from coop_drake.plant import ObjectInertia, RobotPlant, TeamPlant, base_chain, build_robot_plant, robot_chain
 from coop_drake.plant.team import RobotModel
-from coop_drake.robustness.tracking import unknown_time
+from coop_drake.robustness.tracking import moving_of, unknown_time
 from coop_drake.scenario import Hold, Scenario
 from coop_drake.systems import GovernedCell, MonitoredRobot
 from coop_drake.tree.arrays import FloatArray
@@ -260,12 +260,22 @@ def _monitored(scenario: Scenario, plan: Plan, team: TeamPlant, robot: RobotMode
             f"a number, {budget.control_rate:g} Hz: the plan's budget holds for a sampled team",
         )  # fmt: skip
     own = [1, *range(2 + robot.q_slice.start, 2 + robot.q_slice.stop)]
-    levels = away.alarm[0], away.rate_alarm[0], budget.grasp_noise, budget.turn_noise, away.ahead_alarm[0]
+    # By a wrong clock a robot measures itself earlier or later than the object's pose, while both move.
+    assert plan.motion is not None  # departures are those from a motion
+    moving = budget.clock_error * (moving_of(plan.motion).rate.max(axis=0) + away.rate)
+    grasp = moving[0] + max(hypot(one.X_LE.x, one.X_LE.y) for one in team.robots) * moving[1]
+    levels = (
+        away.alarm[0],
+        away.rate_alarm[0],
+        inf if budget.grasp_noise is None else budget.grasp_noise + grasp,
+        inf if budget.turn_noise is None else budget.turn_noise + moving[1],
+        away.ahead_alarm[0],
+    )
     return MonitoredRobot(
         chain=robot_chain(_robot(scenario, robot.index, 1.0)),
         p_LE=np.array([robot.X_LE.x, robot.X_LE.y]),
         mounting=base_chain(team, robot).mounting,
-        levels=np.array([inf if level is None else level for level in levels]),
+        levels=np.array(levels),
         unseen=unknown_time(budget),
         axis_alarms=np.array([away.alarm[own], away.rate_alarm[own], away.ahead_alarm[own]]),
         period=deployment.period,

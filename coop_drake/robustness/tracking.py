@@ -363,6 +363,22 @@ def stated_departures(loop: Loop, moving: Moving, couplings: Couplings, pulled: 
     )
 
 
+def allowed_departures(motion: Motion, budget: Budget, stated: Departures) -> FloatArray:
+    """Return how far a team may be off the mean of its robots' motions, and so for rates, shape (2, 2 + n).
+
+    Departures are stated from the motion by a clock without error. By their own clocks, robots are further
+    along it or less far, and so is their mean: by eps |x^'|, which is to be added where the team moves, and
+    by what accelerations add to that and to rates, which is counted here.
+
+    Args:
+        motion: The motion.
+        budget: The budget.
+        stated: What a plan states.
+    """
+    eps, hardest = budget.clock_error, moving_of(motion).acceleration.max(axis=0)
+    return np.array([stated.position + eps * eps * hardest, stated.rate + eps * hardest])
+
+
 def goal_tolerances(problem: PlanningProblem) -> FloatArray:
     """Return by how much the team may be off its goal, infinite where it is free, shape (2 + n,) [m, rad]."""
     wanted = np.array([goal is not None for goal in problem.goal_joints], bool)

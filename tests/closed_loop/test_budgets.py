@@ -7,11 +7,13 @@ import numpy as np
 import pytest
 
 from coop_drake.cli.summary import beyond_budget, budget_facts
+from coop_drake.compiled_loop import prepare
+from coop_drake.compiled_loop import run as run_compiled
 from coop_drake.errors import RefusalError
 from coop_drake.simulation import simulate
 from coop_drake.verification.runs.budget import check_budget_used
 from coop_drake.verification.runs.rows import Rows
-from tests.support.motions import motion_under_budget
+from tests.support.motions import budgeted_motion, motion_under_budget
 from tests.support.run_checks import verified_run
 from tests.support.small_loop import small_maps
 
@@ -62,3 +64,19 @@ def test_a_stated_departure_that_is_exceeded_in_the_world_is_said_and_its_log_re
 def test_phases_of_clocks_that_differ_are_those_of_two_milliseconds():
     _, _, log = run()
     assert 0.0 < np.ptp(log.phases[..., 0], axis=1).max() <= 0.004
+
+
+@pytest.mark.parametrize("delay", [0.0, 0.005])
+@pytest.mark.parametrize("seed", [1, 2])
+def test_clocks_alone_are_within_a_budget_of_them_and_no_alarm(delay, seed):
+    """Where nothing is noisy, levels are as small as they can be."""
+    scenario, plan = budgeted_motion(
+        {
+            "control_rate": 200, "clock_error": 0.002, "budget": "all", "seed": seed,
+            "measurements": {"delay": delay},
+        }
+    )  # fmt: skip
+    outcome = run_compiled(prepare(scenario, plan, small_maps()), scenario.deployment)
+    assert outcome.arrived, outcome.reason
+    assert 0.0 < outcome.budget_share < 1.0
+    assert 0.0 < outcome.alarm_share < 1.0

@@ -76,9 +76,14 @@ def planned_under_budget(name: str) -> tuple[Plan, PlanningProblem, GainSet]:
 @cache
 def motion_under_budget() -> tuple[Scenario, Plan]:
     """Scenario and hand-written plan of a usual team, with the departures of its motion; cells are large."""
+    return budgeted_motion({"preset": "mobile_base", "budget": "all"})
+
+
+def budgeted_motion(deployment: dict[str, object]) -> tuple[Scenario, Plan]:
+    """The same for another section ``deployment``."""
     scenario, found = small_motion()
     scenario = replace(scenario, limits=WIDER)
-    section = with_preset({"preset": "mobile_base", "budget": "all"})
+    section = with_preset(deployment)
     scenario = replace(scenario, deployment=convert(section, Deployment))
     problem = planning_problem(scenario)
     budget = budget_of("all", scenario, problem)

@@ -7,8 +7,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from coop_drake.answers.budget import Departures
+from coop_drake.answers.budget import Budget, Departures
 from coop_drake.answers.motion import Motion
+from coop_drake.robustness.tracking import allowed_departures
 from coop_drake.tree.arrays import FloatArray, IntArray
 from coop_drake.verification.checks import Check
 from coop_drake.verification.runs.motion import motion_at_phases
@@ -98,17 +99,20 @@ def budget_share(rows: Rows) -> float:
 
 def stated_departures(rows: Rows) -> list[Departure]:
     """Return all departures about which a plan with a budget states something."""
-    if rows.plan.departures is None or rows.plan.motion is None:
+    if rows.plan.departures is None or rows.plan.motion is None or rows.plan.budget is None:
         return []
-    return _from_motion(rows, rows.plan.motion, rows.plan.departures)
+    return _from_motion(rows, rows.plan.motion, rows.plan.budget, rows.plan.departures)
 
 
-def _from_motion(rows: Rows, motion: Motion, stated: Departures) -> list[Departure]:
+def _from_motion(rows: Rows, motion: Motion, budget: Budget, stated: Departures) -> list[Departure]:
     """Return all departures from the mean of the robots' motions."""
     log, names = rows.log, ("the object's angle", *rows.log.joint_names)
     each = [motion_at_phases(motion, phases) for phases in np.moveaxis(log.phases, 1, 0)]
     nominal, velocity = np.mean([one[:2] for one in each], axis=0)
     off, fast = rows.z - nominal, rows.rates - velocity
+    rates = np.column_stack([np.hypot(velocity[:, 0], velocity[:, 1]), np.abs(velocity[:, 2:])])
+    near, steady = allowed_departures(motion, budget, stated)
+    near = near + budget.clock_error * rates
     every, found = np.arange(len(log.times)), list[Departure]()
     for statement, array, what, away, most in (
         (
@@ -116,23 +120,23 @@ def _from_motion(rows: Rows, motion: Motion, stated: Departures) -> list[Departu
             "object_pose",
             "position",
             off,
-            stated.position,
+            near,
         ),
-        ("its velocity stayed as near to that of the motion", "object_twist", "velocity", fast, stated.rate),
+        ("its velocity stayed as near to that of the motion", "object_twist", "velocity", fast, steady),
     ):
         values = np.hypot(away[:, 0], away[:, 1])[:, None]
-        most = np.full(values.shape, most[0])
+        most = np.broadcast_to(most, (len(every), most.shape[-1]))[:, :1]
         found.append(
             Departure(statement, array, (f"the object's {what}",), _FAR.format("m, m/s"), values, most, every)
         )
-    if rows.plan.budget is None or not rows.plan.budget.axes:
+    if not budget.axes:
         return found
     rated = tuple(f"the rate of {name}" for name in names)
     for statement, array, which, away, most in (
-        ("axes stayed near their motion", "angle, joints", names, off, stated.position),
-        ("their rates stayed near those of the motion", "joint_rates", rated, fast, stated.rate),
+        ("axes stayed near their motion", "angle, joints", names, off, near),
+        ("their rates stayed near those of the motion", "joint_rates", rated, fast, steady),
     ):
         values = np.abs(away[:, 2:])
-        bounds = np.broadcast_to(most[1:], values.shape)
+        bounds = np.broadcast_to(most[..., 1:], values.shape)
         found.append(Departure(statement, array, which, _FAR.format("rad or m"), values, bounds, every))
     return found
