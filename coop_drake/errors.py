@@ -148,6 +148,10 @@ class TooQuickError(StallError):
     """In a transition a limit of acceleration would act; the message names the joint."""
 
 
+class TooSlowError(StallError):
+    """Within a limit the motion of a cell would take too long; the message names the limit's key."""
+
+
 class RefusalError(CoopDrakeError):
     """A plan, a proof or a log does not hold; the message says where and what is wrong there, with numbers.
 

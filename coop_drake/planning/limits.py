@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
-from math import inf
+from math import ceil, floor, inf, log10
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -164,6 +165,63 @@ def check_accelerations(plan: Plan, most: FloatArray) -> None:
             f"cell {cell}: {plan.joint_names[axis - 1]} would be accelerated by more than {most[axis]:.3g}, "
             "what its limit of acceleration leaves; expected a larger limit, or gains for older commands"
         )
+
+
+# The limit within which a motion through all cells takes too long.
+
+_OF_MOTIONS = (
+    ("base_speeds", "limits.*.base_speed", "m/s", 1),
+    ("turn_rates", "limits.*.base_turn_rate", "rad/s", 1),
+    ("joint_rates", "limits.*.joint_rates", "rad/s or m/s", 1),
+    ("base_accelerations", "limits.*.base_acceleration", "m/s^2", 2),
+    ("turn_accelerations", "limits.*.base_turn_acceleration", "rad/s^2", 2),
+    ("joint_accelerations", "limits.*.joint_accelerations", "rad/s^2 or m/s^2", 2),
+    ("object_acceleration", "limits.object.acceleration", "m/s^2", 2),
+    ("frictions", "limits.*.friction", "of the weight", 2),
+    ("base_forces", "deployment.actuators.base_force", "N", 2),
+    ("base_jerks", "limits.*.base_jerk", "m/s^3", 3),
+)
+"""Limits that motions keep: attribute, key, unit, and by which power of 1/t each changes with the time t."""
+
+SMALLEST_STEP, UNKNOWN_STEP = 1.02, 10.0
+"""Smallest factor by which a limit that is too low is raised, and that where no motion is known [-]."""
+
+
+def limit_too_low(
+    limits: TeamLimits, seconds: float, longest: float, slowest: Callable[[TeamLimits], float]
+) -> str | None:
+    """Return which limit alone makes a motion too slow, and with which value it is quick enough, in words.
+
+    Args:
+        limits: What the team keeps, see ``PlanningProblem.kept_limits``.
+        seconds: The longest time of a cell within them, infinite where no motion was found [s].
+        longest: The longest one that is allowed [s].
+        slowest: Returns the longest time of a cell within other limits, infinite where there is no motion.
+    """
+    unknown: dict[str, Any] = {name: np.full(getattr(limits, name).shape, np.inf) for name, *_ in _OF_MOTIONS}
+    usual = replace(limits, **unknown).with_defaults()
+    for name, key, unit, power in _OF_MOTIONS:
+        stated, most = getattr(limits, name), getattr(usual, name)
+        if not (stated < most).any():
+            continue
+        if slowest(replace(limits, **{name: np.maximum(stated, most)})) > longest:
+            continue
+        value, now = float(stated.min()), seconds
+        while now > longest and value < most.max():
+            step = (now / longest) ** power if now < inf else UNKNOWN_STEP
+            value = rounded_up(value * max(step, SMALLEST_STEP))
+            now = slowest(replace(limits, **{name: np.maximum(stated, value)}))
+        return (
+            f"{key} is {stated.min():g} {unit}, with which a cell takes longer than the {longest:g} s that "
+            f"planner.max_transition_time allows; expected {min(value, float(most.max())):g} {unit} or more"
+        )
+    return None
+
+
+def rounded_up(value: float) -> float:
+    """Return a positive number with two digits that is not below another one."""
+    digit = 10.0 ** (floor(log10(value)) - 1)
+    return float(f"{ceil(value / digit - ROUNDING) * digit:.2g}")
 
 
 # The limits of a scenario with which a plan along a way that exists cannot be carried out.

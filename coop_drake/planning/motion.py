@@ -32,6 +32,7 @@ where limits are kept; a last slowing keeps them between the knots, too.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from math import inf, isfinite
@@ -48,8 +49,6 @@ from coop_drake.answers.plan import Plan
 from coop_drake.answers.problem import PlanningProblem
 from coop_drake.errors import PlanError
 from coop_drake.geometry.polygons import edges_of
-from coop_drake.jit import compiled
-from coop_drake.laws.governor import Value
 from coop_drake.planning.motion_barrier import (
     BEZIER,
     BRAKES,
@@ -58,11 +57,14 @@ from coop_drake.planning.motion_barrier import (
     Slopes,
     add_times,
     barrier,
+    brake,
     lay_planes,
+    time_shares,
 )
 from coop_drake.planning.motion_limits import (
     Chains,
     largest_shares,
+    slow_limits,
     team_chains,
     times_at_limits,
 )
@@ -113,9 +115,13 @@ DONE = 50.0
 
 MARGIN, MARGIN_SHARE = 1e-3, 0.02
 """Distance that a motion keeps from the ends of its cells' intervals [rad or m] and from the boundaries of
-their regions [m]; and the largest share of an interval that this distance may take [-]. Where a piece is
-nearer to a boundary, the motion keeps nine tenths of its distance. So a log can show that the states between
-its rows are in the cells, too."""
+their regions [m], besides the room for departures; and the largest share of an interval that this distance
+may take [-]. Where a piece is nearer to a boundary, the motion keeps nine tenths of its distance. So a log
+can show that the states between its rows are in the cells, too."""
+
+ROOM, ROOM_SHARE = 8e-3, 0.2
+"""Distance from the ends of intervals [rad or m], and its largest share of an interval [-], where no budget
+says how much room the team needs: usual noise moves it by some milliradians."""
 
 LARGEST_START = 10.0
 """Largest rate alpha of a start [1/s], for motions that need hardly any acceleration."""
@@ -164,10 +170,13 @@ class CellSets(NamedTuple):
     ends: IntArray
 
 
-def cell_sets(plan: Plan, room: FloatArray | float) -> CellSets:
+def cell_sets(plan: Plan, room: FloatArray | None) -> CellSets:
     """Return the cells of a plan as a motion sees them; room is kept from the ends of axes' intervals."""
     lower, upper = (np.array([getattr(cell, end) for cell in plan.cells]) for end in ("lower", "upper"))
-    kept = room + np.minimum(MARGIN, MARGIN_SHARE * (upper - lower))
+    if room is None:
+        kept = np.minimum(ROOM, ROOM_SHARE * (upper - lower))
+    else:
+        kept = room + np.minimum(MARGIN, MARGIN_SHARE * (upper - lower))
     if not (lower + kept < upper - kept).all():
         cell, axis = np.argwhere(lower + kept >= upper - kept)[0]
         raise PlanError(f"cell {cell} leaves no room on axis {axis}")
@@ -181,22 +190,12 @@ def cell_sets(plan: Plan, room: FloatArray | float) -> CellSets:
 # The initial path: along the plan's paths, every span in a cell.
 
 
-def first_points(
-    plan: Plan, cells: CellSets, chains: Chains, limits: FloatArray, overlap: float
-) -> FloatArray:
-    """Return control points (z, t) along a plan's paths, three at rest at either end, evenly timed, (m, D).
+def first_ways(plan: Plan) -> list[FloatArray]:
+    """Return samples along the path of every transition, shape (SAMPLES, 3 + n) each.
 
-    Angles and joints move evenly from the middle of one goal interval to that of the next. Spans are shorter
-    where two cells overlap for a short way only, and where there is little clearance.
-
-    Args:
-        plan: The plan.
-        cells: Its cells, as the motion sees them.
-        chains: The bases.
-        limits: Largest velocities and accelerations, see ``motion_limits``.
-        overlap: Fewest spans of an overlap of two cells [-].
+    Angles and joints move evenly from the middle of one goal interval to that of the next.
     """
-    ways, clearances, overlaps, resting = [], [], [], plan.start[2:]
+    ways, resting = [], plan.start[2:]
     for index, transition in enumerate(plan.transitions):
         goal = 0.5 * (transition.goal_lower + transition.goal_upper)
         if index + 1 == len(plan.transitions):
@@ -206,9 +205,27 @@ def first_points(
         line, shares = shapely.LineString(transition.path), np.linspace(0.0, 1.0, SAMPLES)
         places = shapely.get_coordinates(shapely.line_interpolate_point(line, shares, normalized=True))
         ways.append(np.hstack([places, resting + shares[:, None] * (goal - resting)]))
-        region = plan.governed(index)
-        clearances.append(shapely.distance(shapely.boundary(region), shapely.points(places)))
         resting = goal
+    return ways
+
+
+def first_points(
+    ways: Sequence[FloatArray], cells: CellSets, chains: Chains, limits: FloatArray, overlap: float
+) -> FloatArray:
+    """Return control points (z, t) along ways, three at rest at either end, evenly timed, shape (m, D).
+
+    Spans are shorter where two cells overlap for a short way only, and where there is little clearance.
+
+    Args:
+        ways: See ``first_ways``.
+        cells: The cells, as the motion sees them.
+        chains: The bases.
+        limits: Largest velocities and accelerations, see ``motion_limits``.
+        overlap: Fewest spans of an overlap of two cells [-].
+    """
+    clearances, overlaps = [], []
+    for region, places in zip(cells.regions, ways, strict=True):
+        clearances.append(shapely.distance(shapely.boundary(region), shapely.points(places[:, :2])))
     for index, (before, after) in enumerate(pairwise(ways)):
         overlaps.append((_inside(cells, index + 1, before), _inside(cells, index, after)))
     way, clearance = np.concatenate(ways), np.concatenate(clearances)
@@ -303,52 +320,6 @@ def pieces_of_cells(inside: NDArray[np.bool_]) -> tuple[IntArray, IntArray]:
 # The program.
 
 
-@compiled(borrows=True)
-def brake(
-    points: FloatArray, windows: FloatArray, waiting: float, kappa: FloatArray, acting: IntArray
-) -> bool:
-    """Write kappa of every cell but the last, and where it may act; return whether cells last long enough.
-
-    Args:
-        points: Control points (z, t), shape (m, D).
-        windows: u at which the motion enters every cell and at which it leaves it, shape (cells, 2).
-        waiting: 2 W, from tau_i to beta_i [s].
-        kappa: Receives the rates, shape (cells,) [1/s].
-        acting: See ``barrier``; receives cells.
-    """
-    m, T = points.shape[0], points.shape[1] - 1
-    before = -np.inf
-    for j in range(m):
-        acting[j, 0] = 0
-    for cell in range(len(windows) - 1):
-        tau = x = 0.0
-        begin, end = int(windows[cell, 0]), int(windows[cell, 1])
-        for e in range(4):
-            tau += _time_shares(windows[cell, 0] - begin)[e] * points[min(begin + e, m - 1), T]
-            x += _time_shares(windows[cell, 1] - end)[e] * points[min(end + e, m - 1), T]
-        left = 2.0 * (x - tau - waiting) - BRAKE_RAMP
-        if not left > 0.0:
-            return False
-        kappa[cell] = 1.0 / left
-        for j in range(1, min(int(windows[cell, 1]) + 3, m - 1)):
-            if points[j + 1, T] >= before:
-                if acting[j, 0] == BRAKES:
-                    return False
-                acting[j, 0] += 1
-                acting[j, acting[j, 0]] = cell
-        before = tau + waiting
-    return True
-
-
-@compiled(inlined=True)
-def _time_shares(s: Value) -> tuple[Value, Value, Value, Value]:
-    """Return by which shares of its control points t is found at s from 0 to 1 in a span, taken linear there.
-
-    Where spans are equal, it is.
-    """
-    return (1.0 - s) / 6.0, (4.0 - 3.0 * s) / 6.0, (1.0 + 3.0 * s) / 6.0, s / 6.0
-
-
 def quickest_motion(
     plan: Plan,
     problem: PlanningProblem,
@@ -365,19 +336,22 @@ def quickest_motion(
         limits: Largest velocities, accelerations and jerks, see ``motion_limits``.
         gains: Gains with which the team will be pulled to the motion.
         waiting: 2 W [s].
-        room: Distance that axes keep from the ends of their intervals, shape (1 + n,) [rad, m]; the regions
-            of a plan with a budget have the room of the position already.
+        room: Room for departures of the axes, shape (1 + n,) [rad, m]; the regions of a plan with a budget
+            have that of the position already. None without a budget.
 
     Raises:
         PlanError: No motion was found that stays in the cells; says where.
     """
-    chains, table = team_chains(problem), LIMIT_SHARE * limits
-    cells = cell_sets(plan, 0.0 if room is None else room)
+    chains, cells, ways = team_chains(problem), cell_sets(plan, room), first_ways(plan)
+    # The program of a slow team is that of a usual one in a longer unit of time.
+    unit, scaled = slow_limits(chains, limits, ways)
+    table = LIMIT_SHARE * scaled
+    wait, ramp = waiting / unit, BRAKE_RAMP / unit
     free = np.where([True, True, False], table, inf)  # Jerk is limited where spans are about equal.
     for finer in range(FINER + 1):
-        points = first_points(plan, cells, chains, table, OVERLAP_SPANS * 2**finer)
+        points = first_points(ways, cells, chains, table, OVERLAP_SPANS * 2**finer)
         try:
-            last = _Program(cells, chains, free, waiting, points, EVENNESS, parts=1)
+            last = _Program(cells, chains, free, wait, ramp, points, EVENNESS, parts=1)
             break
         except PlanError:
             if finer == FINER:
@@ -389,7 +363,7 @@ def quickest_motion(
             longest = max(PERIOD, float(before[-2, -1]) / MOST_SPANS)
             equal = uniform_points(before, longest / 2**finer)
             try:
-                last = _Program(cells, chains, table, waiting, equal, evenness, PARTS)
+                last = _Program(cells, chains, table, wait, ramp, equal, evenness, PARTS)
             except PlanError:
                 if finer == FINER:
                     raise
@@ -399,9 +373,9 @@ def quickest_motion(
                 break
     if not (np.diff(last.windows[:, 1]) > 0.0).all():
         raise PlanError("a cell is not left after the one before it")
-    period = float(last.points[2, -1] - last.points[1, -1])
-    made = last.points[:, :-1].copy(), period, period * last.windows, last.kappa.copy()
-    return Motion(*made, waiting, BRAKE_RAMP, last.start_rate, gains)
+    period = unit * float(last.points[2, -1] - last.points[1, -1])
+    made = last.points[:, :-1].copy(), period, period * last.windows, last.kappa / unit
+    return Motion(*made, waiting, BRAKE_RAMP, min(last.start_rate / unit, LARGEST_START), gains)
 
 
 def uniform_points(points: FloatArray, period: float) -> FloatArray:
@@ -440,6 +414,7 @@ class _Program:
         chains: The bases.
         limits: Largest velocities, accelerations and jerks, see ``motion_limits``.
         waiting: 2 W [s].
+        ramp: r [s].
         points: Control points (z, t), shape (m, D).
         evenness: Largest ratio of times between neighbouring control points, 1 for equal spans [-].
         parts: Parts of a span, at whose ends cells may be entered and left [-].
@@ -457,6 +432,7 @@ class _Program:
     chains: Chains
     limits: FloatArray
     waiting: float
+    ramp: float
     points: FloatArray
     evenness: float
     parts: int
@@ -536,7 +512,7 @@ class _Program:
 
     def value(self, points: FloatArray, weight: float, slopes: Slopes | None = None) -> float:
         """Return what is minimised, infinite where a limit is not kept, and add its derivatives."""
-        if not brake(points, self.windows, self.waiting, self.kappa, self.acting):
+        if not brake(points, self.windows, self.waiting, self.ramp, self.kappa, self.acting):
             return inf
         given = slopes or Slopes(*(np.empty(shape) for shape in ((0, 0), 0, (0, 0), 0, 0)))
         value = float(points[-2, -1])
@@ -561,7 +537,7 @@ class _Program:
             u, last, step = self.windows[:-1], len(self.points) - 1, np.empty(m * D)
             places, shares = np.zeros((cells, 8), np.int64), np.zeros((cells, 8))
             at = (np.minimum(u.astype(int)[..., None] + np.arange(4), last) + 1) * D - 1
-            by = np.stack(_time_shares(u - u.astype(int)), axis=2) * [[[2.0], [-2.0]]]
+            by = np.stack(time_shares(u - u.astype(int)), axis=2) * [[[2.0], [-2.0]]]
             places[:-1] = at.reshape(-1, 8)
             shares[:-1] = (self.kappa[:-1, None, None] * by).reshape(-1, 8)
             slope = newton_step(slopes, places, shares, self.held, self.lengths, step)
@@ -587,14 +563,14 @@ class _Program:
         """
         points, period = self.points[:, :-1].copy(), float(self.points[2, -1] - self.points[1, -1])
         windows = period * self.windows
-        brake(self.points, self.windows, self.waiting, self.kappa, self.acting)
+        brake(self.points, self.windows, self.waiting, self.ramp, self.kappa, self.acting)
         begin = np.append(-inf, windows[:-1, 0] + self.waiting)[:-1]
         ranges = np.stack([begin, windows[:-1, 1]], axis=1)
         shares = largest_shares(points, period, self.chains, self.limits, self.kappa, ranges)
         fast, hard, rough, starting = shares
         factor = max(fast, hard**0.5, rough ** (1.0 / 3.0), 1.0)
         self.points[:, -1] *= factor
-        brake(self.points, self.windows, self.waiting, self.kappa, self.acting)
+        brake(self.points, self.windows, self.waiting, self.ramp, self.kappa, self.acting)
         # With rho' up to alpha (1 - rho^2), a start keeps the limits of acceleration where alpha V does.
-        self.start_rate = min(float(factor) / starting, LARGEST_START)
+        self.start_rate = float(factor) / starting
         return float(factor)

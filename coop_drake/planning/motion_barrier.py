@@ -12,6 +12,7 @@ import numpy as np
 
 from coop_drake.geometry.polygons import nearest_fraction
 from coop_drake.jit import compiled
+from coop_drake.laws.governor import Value
 from coop_drake.planning.motion_limits import Chains, follow
 from coop_drake.tree.arrays import FloatArray, IntArray
 
@@ -69,6 +70,59 @@ class Slopes(NamedTuple):
     mixed: FloatArray
     rates: FloatArray
     rate: FloatArray
+
+
+# How quickly the team brakes.
+
+
+@compiled(borrows=True)
+def brake(
+    points: FloatArray, windows: FloatArray, waiting: float, ramp: float, kappa: FloatArray, acting: IntArray
+) -> bool:
+    """Write kappa of every cell but the last, and where it may act; return whether cells last long enough.
+
+    Args:
+        points: Control points (z, t), shape (m, D).
+        windows: u at which the motion enters every cell and at which it leaves it, shape (cells, 2).
+        waiting: 2 W, from tau_i to beta_i [s].
+        ramp: r [s].
+        kappa: Receives the rates, shape (cells,) [1/s].
+        acting: See ``barrier``; receives cells.
+    """
+    m, T = points.shape[0], points.shape[1] - 1
+    before = -np.inf
+    for j in range(m):
+        acting[j, 0] = 0
+    for cell in range(len(windows) - 1):
+        tau = x = 0.0
+        begin, end = int(windows[cell, 0]), int(windows[cell, 1])
+        for e in range(4):
+            tau += time_shares(windows[cell, 0] - begin)[e] * points[min(begin + e, m - 1), T]
+            x += time_shares(windows[cell, 1] - end)[e] * points[min(end + e, m - 1), T]
+        left = 2.0 * (x - tau - waiting) - ramp
+        if not left > 0.0:
+            return False
+        kappa[cell] = 1.0 / left
+        for j in range(1, min(int(windows[cell, 1]) + 3, m - 1)):
+            if points[j + 1, T] >= before:
+                if acting[j, 0] == BRAKES:
+                    return False
+                acting[j, 0] += 1
+                acting[j, acting[j, 0]] = cell
+        before = tau + waiting
+    return True
+
+
+@compiled(inlined=True)
+def time_shares(s: Value) -> tuple[Value, Value, Value, Value]:
+    """Return by which shares of its control points t is found at s from 0 to 1 in a span, taken linear there.
+
+    Where spans are equal, it is.
+    """
+    return (1.0 - s) / 6.0, (4.0 - 3.0 * s) / 6.0, (1.0 + 3.0 * s) / 6.0, s / 6.0
+
+
+# The barrier.
 
 
 @compiled

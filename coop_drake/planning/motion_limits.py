@@ -6,11 +6,13 @@ the acceleration of their common centre of mass, a sum of turned arms as the pos
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from math import cos, inf, sin
 from typing import NamedTuple
 
 import numpy as np
 
+from coop_drake.answers import motion as usually
 from coop_drake.answers.motion import GRAVITY
 from coop_drake.answers.problem import PlanningProblem, TeamLimits
 from coop_drake.jit import compiled
@@ -176,6 +178,46 @@ def times_at_limits(chains: Chains, limits: FloatArray, points: FloatArray) -> F
     shares = np.concatenate(moved)
     seconds: FloatArray = (shares / limits[1 : 1 + len(shares), :1]).max(axis=0)
     return seconds
+
+
+FAR_ABOVE = 2.0
+"""Largest limit of a slow team in its unit of time, over the usual one [-]."""
+
+
+def slow_limits(chains: Chains, limits: FloatArray, ways: Sequence[FloatArray]) -> tuple[float, FloatArray]:
+    """Return how many times as long ways take within limits as within usual ones, and limits in this unit.
+
+    The factor is at least 1. Alone and from rest to rest, a way of length s takes at least s / v,
+    2 sqrt(s / a) and (32 s / j)^(1/3). Limits in a longer unit of time are larger numbers; those that would
+    be far above the usual ones are ``FAR_ABOVE`` times these, which hardly matters where another is as slow.
+
+    Args:
+        chains: The bases.
+        limits: See ``motion_limits``.
+        ways: Configurations along them, shape (samples, 3 + n) each.
+    """
+    lengths = []
+    for way in ways:
+        bases, steps = np.diff(base_places(chains, way), axis=1), np.abs(np.diff(way, axis=0))
+        moved = np.hypot(bases[..., 0], bases[..., 1]).sum(axis=1)
+        turned, others = np.abs(bases[..., 2]).sum(axis=1), steps[:, 3:].sum(axis=0)
+        lengths.append([np.hypot(*steps[:, :2].T).sum(), *moved, *turned, *others, *moved])
+    usual = np.array(
+        [(inf, usually.OBJECT_ACCELERATION, inf)]
+        + [(usually.BASE_SPEED, usually.BASE_ACCELERATION, usually.BASE_JERK)] * chains.bases
+        + [(usually.TURN_RATE, usually.TURN_ACCELERATION, inf)] * chains.bases
+        + [(usually.JOINT_RATE, usually.JOINT_ACCELERATION, inf)] * (ways[0].shape[1] - 3)
+        + [(inf, usually.FRICTION * usually.GRAVITY, inf)] * chains.bases
+    )[: len(limits)]
+    found = np.array(lengths)[:, : len(limits)]
+    least, usually_least = (
+        np.maximum.reduce([found / v, 2.0 * np.sqrt(found / a), np.cbrt(32.0 * found / j)]).max(axis=1).sum()
+        for v, a, j in (limits.T, usual.T)
+    )
+    unit = float(least / usually_least)
+    if unit <= 1.0:
+        return 1.0, limits
+    return unit, np.minimum(limits * np.power(unit, [1.0, 2.0, 3.0]), FAR_ABOVE * usual)
 
 
 # What moves, with derivatives.

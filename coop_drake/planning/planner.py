@@ -15,7 +15,7 @@ from shapely.errors import ShapelyError
 
 from coop_drake.answers.budget import Budget
 from coop_drake.answers.document import problem_digest
-from coop_drake.answers.motion import cell_times, pull_gains
+from coop_drake.answers.motion import Motion, cell_times, pull_gains
 from coop_drake.answers.plan import (
     SLOWEST_AGE,
     BeyondLimits,
@@ -26,13 +26,13 @@ from coop_drake.answers.plan import (
     SearchReport,
     Undecided,
 )
-from coop_drake.answers.problem import PlanningProblem
-from coop_drake.errors import GeometryError, PatienceError, PlanError, StallError, TooQuickError
+from coop_drake.answers.problem import PlanningProblem, TeamLimits
+from coop_drake.errors import GeometryError, PatienceError, PlanError, StallError, TooQuickError, TooSlowError
 from coop_drake.laws import GainSet, ScheduledGains
 from coop_drake.planning.cell_selection import quickest_plan
 from coop_drake.planning.channel import Channel, CoveredPath, NoChannel, ended
 from coop_drake.planning.duration import plan_time
-from coop_drake.planning.limits import refusals, without_limits
+from coop_drake.planning.limits import limit_too_low, refusals, without_limits
 from coop_drake.planning.questions import SAME_END
 from coop_drake.planning.sampling.routes import local_question
 from coop_drake.planning.search import find_path
@@ -129,6 +129,8 @@ def _answer(
         make = partial(_made, asked, gain_set, gain_set_name, budget)
         try:
             made = _finished(partial(make, answer), progress)
+        except TooSlowError as error:  # Other cells do not help.
+            return Undecided(str(error), report)
         except (GeometryError, PlanError, StallError, ShapelyError) as error:
             stall = f"a free path exists, but a plan along it cannot be executed: {error}"
             too_quick = isinstance(error, TooQuickError)
@@ -249,13 +251,16 @@ def _passing(
             with suppress(PatienceError):  # The plan is certified: it gets its motion.
                 progress("planning the motion through all cells", 0.0)
         age = gain_set.age if isinstance(gain_set, ScheduledGains) else 0.0
+        find = partial(quickest_motion, made, problem, gains=pull_gains(age))
         try:
-            motion = quickest_motion(made, problem, motion_limits(problem.limits), pull_gains(age))
+            motion = find(limits=motion_limits(problem.limits))
         except (PlanError, np.linalg.LinAlgError) as error:
+            _refuse_low_limits(problem, inf, find)
             raise StallError(
                 f"no motion through its cells without a stop was found: {error}; "
                 "there is a plan for a team that rests in every cell (--gains scheduled)"
             ) from error
+        _refuse_low_limits(problem, float(cell_times(motion).max()), find)
         made = replace(made, motion=motion)
     assert made.motion is not None  # by both ways
     seconds, longest = cell_times(made.motion), problem.settings.max_transition_time
@@ -267,6 +272,27 @@ def _passing(
     steps = zip(made.transitions, seconds.tolist(), strict=True)
     timed = tuple(replace(step, estimated_time=time) for step, time in steps)
     return replace(made, transitions=timed)
+
+
+def _refuse_low_limits(problem: PlanningProblem, seconds: float, find: Callable[..., Motion]) -> None:
+    """Refuse a limit that alone makes a cell last longer than is allowed; says with which value it would not.
+
+    Args:
+        problem: What was asked.
+        seconds: The longest time of a cell, infinite where there is no motion [s].
+        find: Finds the motion within other limits.
+    """
+    from coop_drake.planning.motion_limits import motion_limits  # Here: it imports scipy.
+
+    def slowest(limits: TeamLimits) -> float:
+        try:
+            return float(cell_times(find(limits=motion_limits(limits))).max())
+        except (PlanError, np.linalg.LinAlgError):
+            return inf
+
+    longest = problem.settings.max_transition_time
+    if seconds > longest and (said := limit_too_low(problem.kept_limits, seconds, longest, slowest)):
+        raise TooSlowError(said)
 
 
 def _slow_enough(

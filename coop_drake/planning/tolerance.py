@@ -145,8 +145,9 @@ class _Question:
     def held(self, budget: Budget) -> Plan | str:
         """Return a plan whose motion holds under a budget, or what cannot be shown, in words."""
         waiting, limits = 2.0 * budget.words_window, motion_limits(self.problem.limits)
-        plan = self._plan(np.zeros(len(self.problem.start) - 1))
-        motion = quickest_motion(plan, self.problem, limits, NO_PULL, waiting)
+        room = np.zeros(len(self.problem.start) - 1)
+        plan = self._plan(room)
+        motion = quickest_motion(plan, self.problem, limits, NO_PULL, waiting, room[1:])
         reasons = []
         for pace in PACES:
             slower = replace(motion, period=motion.period / pace, rates=pace * motion.rates)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -9,11 +10,20 @@ import pytest
 import shapely
 from scipy.interpolate import BSpline
 
+from coop_drake.answers import Found, PlanningResult, Undecided
 from coop_drake.answers.motion import WAITING
 from coop_drake.answers.plan import Cell
 from coop_drake.laws import ScheduledGains
+from coop_drake.planning import planner
 from coop_drake.planning.duration import plan_time, timed
-from coop_drake.planning.motion import BRAKE_RAMP, MOST_SPANS, cell_sets, first_points, quickest_motion
+from coop_drake.planning.motion import (
+    BRAKE_RAMP,
+    MOST_SPANS,
+    cell_sets,
+    first_points,
+    first_ways,
+    quickest_motion,
+)
 from coop_drake.planning.motion_barrier import Slopes
 from coop_drake.planning.motion_limits import (
     base_chains,
@@ -91,14 +101,53 @@ def test_cells_are_left_one_after_the_other_where_several_hold_the_end() -> None
     assert motion.windows[-1, 1] == pytest.approx(motion.duration)
 
 
-def test_the_initial_path_of_a_very_slow_team_has_few_points() -> None:
+def test_the_initial_path_along_a_very_long_way_has_few_points() -> None:
     scenario, plan = small_motion()
     problem = planning_problem(scenario)
-    cells, chains, limits = cell_sets(plan, 0.0), team_chains(problem), motion_limits(problem.limits)
-    points = first_points(plan, cells, chains, 1e-3 * limits, 2.0)
+    cells, chains, limits = cell_sets(plan, None), team_chains(problem), motion_limits(problem.limits)
+    points = first_points(first_ways(plan), cells, chains, 1e-3 * limits, 2.0)
     assert len(points) < 3 * MOST_SPANS  # 8687 without a bound
     seconds = times_at_limits(chains, 1e-3 * limits, points[:, :-1]).sum()
     assert seconds <= points[-2, -1] <= 2.0 * seconds
+
+
+def test_slow_teams_take_as_much_longer_as_they_are_slower() -> None:
+    scenario, plan = small_motion()
+    problem, gains = planning_problem(scenario), ((25.0, 10.0), (25.0, 10.0))
+    limits = motion_limits(problem.limits)
+    usual = quickest_motion(plan, problem, limits, gains).duration
+    for slower in (10.0, 1e5):
+        limit = limits / np.power(slower, [1.0, 2.0, 3.0])
+        longer = quickest_motion(plan, problem, limit, gains).duration
+        # A slow team waits for words for a smaller share of its time, and is a little less slow by that.
+        assert 0.5 * slower * usual <= longer <= slower * usual
+
+
+@pytest.mark.parametrize(
+    ("key", "limit"),
+    [
+        ("base_speed", {"base_speeds": np.full(2, 1e-4)}),
+        ("base_turn_rate", {"turn_rates": np.full(2, 1e-5)}),
+        ("base_acceleration", {"base_accelerations": np.full(2, 1e-5)}),
+        ("friction", {"frictions": np.full(2, 1e-6)}),
+    ],
+)
+def test_a_limit_that_is_too_low_is_refused_by_its_key_with_a_value_that_is_quick_enough(key, limit) -> None:
+    _, problem = planned_motion("base")
+    ((name, stated),) = limit.items()
+
+    def ask(**changes: FloatArray) -> PlanningResult:
+        asked = replace(problem, limits=replace(problem.limits, **changes))
+        return planner.plan(asked, ScheduledGains(), gain_set_name="scheduled")
+
+    refused = ask(**limit)
+    assert isinstance(refused, Undecided)
+    found = re.fullmatch(rf"limits\.\*\.{key} is (\S+) .* expected (\S+) .* or more", refused.reason)
+    assert found is not None
+    assert float(found[1]) == stated[0]
+    least = float(found[2])
+    assert isinstance(ask(**{name: np.full(2, least)}), Found)
+    assert isinstance(ask(**{name: np.full(2, 0.5 * least)}), Undecided)
 
 
 def test_it_begins_and_ends_at_rest(case: Case) -> None:
