@@ -65,7 +65,10 @@ def check_gains(plan: Plan, gain_sets: Mapping[str, GainSet]) -> Check:
         )
         _compare(transition.gains, gains, f"{where}.gains")
         resting = 0.5 * (transition.goal_lower + transition.goal_upper)
-    return Check("gains are those that the gain set gives for the cells", len(plan.transitions))
+    name = "gains are those that the gain set gives for the cells"
+    if plan.motion is not None:
+        name = "gains of a team that would rest in every cell are those of the gain set"
+    return Check(name, len(plan.transitions))
 
 
 def check_ages(plan: Plan, gain_set: GainSet) -> None:

@@ -24,7 +24,8 @@ TRUSTED = (
     "the bounds of what departs under a budget, which the planner uses too (coop_drake/robustness)",
     "the rule by which a plan's gains follow from its cells, which the planner uses too (coop_drake/laws)",
     "the check of a plan's motion, in floating point (coop_drake/verification/motion.py, shapely)",
-    "the simulation that estimates times, for limits that refuse a way (coop_drake/planning/duration.py)",
+    "the simulation that estimates times of teams that rest, for limits that refuse a way "
+    "(coop_drake/planning/duration.py)",
     "Python's integers, and the checker (coop_drake/checking)",
 )
 """What remains to be trusted when the exact checker accepts an answer."""

@@ -147,12 +147,12 @@ def check_funnels(rows: Rows, between: Between) -> tuple[Check, Check]:
 
 
 def check_stated_funnels(rows: Rows) -> Check:
-    """Check that in every row every axis lay in the funnel that is stated there."""
+    """Check that in every row every axis lay in the interval that is stated there."""
     log, axes = rows.log, rows.z[:, 2:]
     margins = np.minimum(axes - log.funnel_lower, log.funnel_upper - axes)
-    rows.require(margins > 0.0, "angle, joints", "lies outside the stated funnel")
+    rows.require(margins > 0.0, "angle, joints", "lies outside the stated interval")
     rows.require_same("funnel_margin", margins.min(axis=1), ROUNDING)
-    name, least = "every axis lay in the stated funnels", float(margins.min())
+    name, least = "every axis lay in the intervals that the log states", float(margins.min())
     return Check(name, axes.size, least, "rad or m, least", ("funnel_margin",))
 
 

@@ -100,7 +100,7 @@ def check_phases(rows: Rows, motion: Motion, *, exact: bool) -> Check:
 
 
 def _check_cells(rows: Rows, motion: Motion, *, exact: bool) -> Check:
-    """Check cells and their times by the phases, the stated funnels, and that a held team rests."""
+    """Check cells and their times by the phases, the stated intervals, and that a held team rests."""
     log, plan = rows.log, rows.plan
     least, most = log.phases[..., PHASE].min(axis=1), log.phases[..., PHASE].max(axis=1)
     bounds = np.array([[cell.lower, cell.upper] for cell in plan.cells])
@@ -126,7 +126,7 @@ def _check_cells(rows: Rows, motion: Motion, *, exact: bool) -> Check:
     rests = (log.held == 0.0) | ((log.held == 1.0) & (log.phases[..., PACE] == 0.0).all(axis=1))
     rows.require(rests, "held", "is {}; it is 1 only where all rest", log.held)
     arrays = ("cell_index", "transition_start", "funnel_lower", "funnel_upper", "clock_lag")
-    name = "cells were entered while the motion lay in both, and are the stated funnels"
+    name = "cells were entered while the motion lay in both, and stated intervals are theirs"
     return Check(
         name, len(entered), float(left.min(initial=np.inf)), "s, least time left in the earlier", arrays
     )

@@ -6,12 +6,11 @@ the array, the index and the time:
 1. It belongs to the plan and the scenario, begins at the plan's start and ends at the goal: below.
 2. Every number is finite, time passes, cells follow one another; rates are the derivatives of positions:
    ``rows``.
-3. Every state lay in its cell and in its funnel; robots report what their states say, and cells were entered
-   one by one when all were ready: ``laws``.
+3. Every state lay in its cell; robots report what their states say, and cells were entered one by one: while
+   the plan's motion lay in both, ``motion``, or in funnels, when all were ready, ``laws``.
 4. Bases, wrenches and efforts go with the motion, bases and joints kept their limits: ``bodies``.
 5. Nothing touched: ``bodies``.
-6. Nothing departed by more than a budget of the plan states. Delta E and reports are those of its nominal
-   motions: ``budget``.
+6. Nothing departed from the motion by more than a budget of the plan states: ``budget``.
 
 Of a run in which all drives braked, statements 3 and 6 are left aside: they are about the plan's laws. Arrays
 that no check computes again, or ties to others, are named in the answer.
@@ -198,7 +197,7 @@ def _left_aside(setup: RunSetup, *, braked: bool) -> list[str]:
     """What is not checked of a team that departs from the ideal one."""
     if braked:
         laws = (
-            "that the team followed the plan: its cells, funnels, reports and budget, for the drives braked"
+            "that the team followed the plan: its cells, its laws and its budget, for the drives braked"
         )
         return [laws] if setup.mechanics else [laws, _FORCES]
     return [] if setup.mechanics else [_FORCES]
