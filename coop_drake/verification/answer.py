@@ -177,7 +177,9 @@ def _unproved_of_control(plan: Plan) -> str:
         left = "that a team that departs by more than the plan's budget stays in the cells, or by more than "
         left += "docs/budget.md estimates"
     else:
-        left = "that angles and joints stay in the cells, and so does a position that departs by more than the "
+        left = (
+            "that angles and joints stay in the cells, and so does a position that departs by more than the "
+        )
         left += "plan's budget"
     if plan.motion is None:
         return left

@@ -196,9 +196,7 @@ def _check_laws(rows: Rows, between: Between, problem: PlanningProblem, setup: R
 def _left_aside(setup: RunSetup, *, braked: bool) -> list[str]:
     """What is not checked of a team that departs from the ideal one."""
     if braked:
-        laws = (
-            "that the team followed the plan: its cells, its laws and its budget, for the drives braked"
-        )
+        laws = "that the team followed the plan: its cells, its laws and its budget, for the drives braked"
         return [laws] if setup.mechanics else [laws, _FORCES]
     return [] if setup.mechanics else [_FORCES]
 
