@@ -33,6 +33,7 @@ from benchmarks.planner.ours import compile_kernels
 from benchmarks.planner.stages import stage_tasks
 from benchmarks.questions.peers import has_ompl
 from benchmarks.questions.question import random_question
+from benchmarks.quickest import quickest_tasks
 from benchmarks.rejoining import rejoining_tasks
 from benchmarks.rows import Ledger, LedgerError
 from benchmarks.simulating import simulating_tasks
@@ -189,6 +190,7 @@ def _tasks(effort: Effort, runs: int) -> list[Task]:
         *adversary_tasks(),
         *message_tasks(),
         *smooth_tasks(runs),
+        *quickest_tasks(),
         *word_tasks(),
         *apart_tasks(),
         *rejoining_tasks(),

@@ -43,7 +43,7 @@ CLOCKS = 0.002
 
 _PRESET = {"preset": "mobile_base", "budget": "all"}
 
-_LIMITS = {
+LIMITS = {
     "*": RobotLimits(
         1.0, 1.0, (1.0,), (2.0,), base_acceleration=1.0, base_turn_acceleration=2.0, base_jerk=10.0
     ),
@@ -65,9 +65,10 @@ def smooth_tasks(runs: int = RUNS) -> list[Task]:
     ]
 
 
-def _scenario(team: str, **changes: object) -> Scenario:
+def limited_scenario(team: str, **changes: object) -> Scenario:
+    """Return a shipped scenario with the limits of this benchmark, and other changes."""
     scenario = load_scenario(team)
-    return replace(scenario, limits=_LIMITS, **changes)  # type: ignore[arg-type]
+    return replace(scenario, limits=LIMITS, **changes)  # type: ignore[arg-type]
 
 
 def _planned(scenario: Scenario) -> tuple[Plan, float]:
@@ -83,7 +84,7 @@ def _planned(scenario: Scenario) -> tuple[Plan, float]:
 
 def _ideal(team: str, _: Sequence[Row]) -> list[Row]:
     """Return how the ideal team passes, beside the quickest way known, and what planning takes."""
-    scenario, name = _scenario(team), f"smooth/ideal/{team}"
+    scenario, name = limited_scenario(team), f"smooth/ideal/{team}"
     made, seconds = _planned(scenario)
     others, of_others = _planned(with_gains(scenario, "scheduled"))
     estimated = sum(one.estimated_time for one in others.transitions)
@@ -176,8 +177,8 @@ def _at_speeds(team: str, _: Sequence[Row]) -> list[Row]:
     """Return what plans take under the preset's budget at several speeds of the bases, or what is said."""
     rows = []
     for speed in SPEEDS:
-        limits = {**_LIMITS, "*": replace(_LIMITS["*"], base_speed=speed)}
-        ideal = replace(_scenario(team), limits=limits)
+        limits = {**LIMITS, "*": replace(LIMITS["*"], base_speed=speed)}
+        ideal = replace(limited_scenario(team), limits=limits)
         begun, compiling = process_time(), COMPILING.cpu_seconds
         result = plan(replace(ideal, deployment=deployment_of(_PRESET)))
         seconds = process_time() - begun - COMPILING.cpu_seconds + compiling
@@ -196,12 +197,12 @@ def _at_speeds(team: str, _: Sequence[Row]) -> list[Row]:
 def _under_budget(team: str, runs: int, _: Sequence[Row]) -> list[Row]:
     """Return what a plan under the preset's budget takes, and how compiled runs of it end."""
     name, departures = f"smooth/budget/{team}", deployment_of(_PRESET)
-    ideal, _seconds = _planned(_scenario(team))
-    made, seconds = _planned(_scenario(team, deployment=departures))
+    ideal, _seconds = _planned(limited_scenario(team))
+    made, seconds = _planned(limited_scenario(team, deployment=departures))
     assert made.motion is not None  # as in every plan of a team that passes
     assert made.departures is not None
     assert ideal.motion is not None
-    transport = prepare(_scenario(team, deployment=departures), made, build_maps(made))
+    transport = prepare(limited_scenario(team, deployment=departures), made, build_maps(made))
     most, random = departures.mass_error, np.random.default_rng(0)
     outcomes = [
         run(transport, replace(departures, mass_error=float(error)), seed=seed)

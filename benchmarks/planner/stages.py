@@ -6,11 +6,14 @@ it work. Each variant is compared with ``everything``: estimated transport time,
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
+from math import inf
 from typing import Any
 from unittest.mock import patch
+
+import numpy as np
 
 from benchmarks.isolated import in_own_process
 from benchmarks.planner.cases import Case
@@ -18,10 +21,16 @@ from benchmarks.planner.family import first_question
 from benchmarks.planner.ours import Planned, plan_repeatedly
 from benchmarks.rows import Row
 from benchmarks.tasks import Task
-from coop_drake.answers import PlanningProblem
-from coop_drake.planning import cell_selection, sampled_search
+from coop_drake.answers import Plan, PlanningProblem
+from coop_drake.answers.motion import WAITING, Motion, TeamGains
+from coop_drake.errors import PlanError
+from coop_drake.planning import cell_selection, motion, sampled_search
+from coop_drake.planning.cell_selection import Waypoints, choose_boxes
+from coop_drake.planning.motion_limits import team_chains
 from coop_drake.planning.sampling import band
 from coop_drake.planning.sampling.band import smoothed
+from coop_drake.planning.transitions import make_plan
+from coop_drake.tree.arrays import FloatArray, IntArray
 
 CASES = ("base", "tight", "three", "elbow", "warehouse")
 """Shipped scenarios that have a plan."""
@@ -54,6 +63,41 @@ def _known_path(problem: PlanningProblem, hierarchy: object, known: Any, gap: fl
     return smoothed(problem, known, band.LEAST_CLEARANCE, 0.0, gap, moves=moves)
 
 
+def _few_wide_boxes(among: Waypoints) -> IntArray:
+    """Choose boxes by their number and padding: the times at which waypoints are reached count as zero."""
+    return choose_boxes(among._replace(places=0.0 * among.places))
+
+
+def _aimless_plan(*given: Any, targets: object, **others: Any) -> Plan:
+    """Make a plan whose boxes are left in the middle of their overlaps, not at targets."""
+    return make_plan(*given, **others)
+
+
+def _motion_along_paths(plan: Plan, problem: PlanningProblem, limits: FloatArray, gains: TeamGains) -> Motion:
+    """Return a motion with the times of the first phase if the way is not moved in it, only its times are.
+
+    Raises:
+        PlanError: The paths do not enter every cell.
+    """
+    chains, cells, table = team_chains(problem), motion.cell_sets(plan, 0.0), motion.LIMIT_SHARE * limits
+    free = np.where([True, True, False], table, inf)
+    for finer in range(motion.FINER + 1):
+        points = motion.first_points(plan, cells, chains, table, motion.OVERLAP_SPANS * 2**finer)
+        try:
+            program = motion._Program(cells, chains, free, WAITING, points, motion.EVENNESS, parts=1)
+            break
+        except PlanError:
+            if finer == motion.FINER:
+                raise
+    program.held.reshape(points.shape)[:, :-1] = True
+    program.solve(motion.WEIGHTS[0])
+    made = motion.uniform_points(program.points, motion.PERIOD)
+    knots = np.arange(len(points) - 2.0)
+    windows = np.interp(program.windows, knots, program.points[1:-1, -1])
+    period, rates = float(made[2, -1] - made[1, -1]), program.kappa
+    return Motion(made[:, :-1], period, windows, rates, WAITING, motion.BRAKE_RAMP, 1.0, gains)
+
+
 STAGES: dict[str, tuple[Replacement, ...]] = {
     "everything": (),
     "no_candidates": (Replacement(sampled_search, "best_candidate", _known_path),),
@@ -65,6 +109,15 @@ STAGES: dict[str, tuple[Replacement, ...]] = {
     "no_covering": (Replacement(cell_selection, "cover_path", lambda *asked: None),),
 }
 """For every variant what is replaced; the name says which stage is missing."""
+
+CHOICES: dict[str, tuple[Replacement, ...]] = {
+    "everything": (),
+    "no_candidates": STAGES["no_candidates"],
+    "no_times_of_boxes": (Replacement(cell_selection, "choose_boxes", _few_wide_boxes),),
+    "no_targets": (Replacement(cell_selection, "make_plan", _aimless_plan),),
+    "no_moved_way": (Replacement(motion, "quickest_motion", _motion_along_paths),),
+}
+"""Likewise for choices of cells and ways that are made so that the motion takes less time."""
 
 
 def stage_tasks(limit: float) -> list[Task]:
@@ -83,15 +136,18 @@ def _task(name: str, limit: float) -> Task:
     return Task(f"planner/stages/{name}", measure)
 
 
-def stage_rows(name: str, problem: PlanningProblem, limit: float) -> list[Row]:
+def stage_rows(
+    name: str, problem: PlanningProblem, limit: float, variants: Collection[str] = STAGES.keys()
+) -> list[Row]:
     """Plan with every stage switched off in turn, in one process of its own.
 
     Args:
         name: What the rows' names begin with.
         problem: The question.
         limit: CPU time of all variants together [s].
+        variants: Of ``STAGES`` or ``CHOICES``.
     """
-    done = in_own_process(plan_variants, problem, limit=limit).value
+    done = in_own_process(plan_variants, problem, tuple(variants), limit=limit).value
     if done is None:
         return [Row(f"{name}/everything/answer", 0.0, f"none within {limit:g} CPU s")]
     rows = []
@@ -108,10 +164,10 @@ def stage_rows(name: str, problem: PlanningProblem, limit: float) -> list[Row]:
     return rows
 
 
-def plan_variants(problem: PlanningProblem) -> dict[str, Planned]:
+def plan_variants(problem: PlanningProblem, variants: Sequence[str]) -> dict[str, Planned]:
     """Plan with every stage switched off in turn, after a small question has loaded the compiled kernels."""
     plan_repeatedly(first_question(), 1, PATIENCE)
-    return {variant: without_stage(problem, variant) for variant in STAGES}
+    return {variant: without_stage(problem, variant) for variant in variants}
 
 
 def without_stage(problem: PlanningProblem, variant: str) -> Planned:
@@ -119,9 +175,9 @@ def without_stage(problem: PlanningProblem, variant: str) -> Planned:
 
     Args:
         problem: The question.
-        variant: One of ``STAGES``.
+        variant: One of ``STAGES`` or ``CHOICES``.
     """
     with ExitStack() as stack:
-        for replaced in STAGES[variant]:
+        for replaced in {**STAGES, **CHOICES}[variant]:
             stack.enter_context(patch.object(replaced.module, replaced.name, replaced.value))
         return min(plan_repeatedly(problem, REPEATS, PATIENCE), key=lambda planned: planned.cpu_seconds)

@@ -37,6 +37,7 @@ from coop_drake.errors import PatienceError, RefusalError
 from coop_drake.files import write_atomically
 from coop_drake.planning import warm_up
 from coop_drake.planning.planner import plan
+from coop_drake.scenario import Scenario
 from coop_drake.tree.arrays import FloatArray
 from coop_drake.typed_data import to_plain
 from coop_drake.verification import verify_plan, verify_proof
@@ -195,7 +196,7 @@ def answer(question: Question, settings: QuestionSettings) -> tuple[QuestionReco
         The record, and what the other planners found.
     """
     began = process_time()
-    result, told, failed = _planned(question, settings.time_limit)
+    result, told, failed = planned_in_time(question.scenario, question.problem, settings.time_limit)
     record = replace(_described(question, result), cpu_seconds=process_time() - began)
     record = replace(record, verdict="failed" if failed else record.verdict, reason=told or record.reason)
     refusal = _refusal(question, result)
@@ -213,8 +214,16 @@ def answer(question: Question, settings: QuestionSettings) -> tuple[QuestionReco
     return searched, found
 
 
-def _planned(question: Question, limit: float) -> tuple[PlanningResult, str, bool]:
-    """The answer, undecided without a certified way in time; a remark; and whether the planner failed."""
+def planned_in_time(
+    scenario: Scenario, problem: PlanningProblem, limit: float
+) -> tuple[PlanningResult, str, bool]:
+    """Return an answer, undecided without a certified way in time; a remark; whether the planner failed.
+
+    Args:
+        scenario: Whose gains are used.
+        problem: What is asked.
+        limit: Time after which an answer counts as undecided, or a plan is not improved any more [CPU s].
+    """
     end, late = process_time() + limit, ""
 
     def check_time(phase: str, fraction: float) -> None:
@@ -223,11 +232,10 @@ def _planned(question: Question, limit: float) -> tuple[PlanningResult, str, boo
             late = late or f"when it was {phase}"
             raise PatienceError(f"not answered within {limit:g} s, {late}")
 
-    scenario = question.scenario
     name = scenario.selected_gains
     gains = scenario.gain_sets[name]
     try:
-        answer = plan(question.problem, gains, gain_set_name=name, progress=check_time)
+        answer = plan(problem, gains, gain_set_name=name, progress=check_time)
     except PatienceError as error:
         return Undecided(str(error), SearchReport(0)), "", False
     except Exception as error:  # Whatever it is, it is a fault of the planner, to be counted as one.
