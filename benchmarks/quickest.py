@@ -15,11 +15,11 @@ time and no body comes nearer to a wall than allowed.
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import partial
-from itertools import count
 from math import inf
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -29,7 +29,6 @@ import numpy as np
 from scipy.interpolate import BSpline
 
 from benchmarks.isolated import in_own_process
-from benchmarks.planner.stages import CHOICES, stage_rows
 from benchmarks.questions.answering import planned_in_time
 from benchmarks.questions.floors import Random
 from benchmarks.questions.peers import has_ompl, run_ompl, run_trees
@@ -60,9 +59,9 @@ between those that it looks at; and distance between bodies that must not meet [
 SPACING, FEWEST, MOST = 0.3, 20, 80
 """Way of the team for each control point, about [m], and bounds of their number [-]."""
 
-STAGES, FINE = 5, 20
-"""Stages of the pace for each control point in the search, and places where clearance is looked at, which
-are stages of the pace of the way that is found [-]."""
+STAGES, FINE, CHECK_STEP = 5, 20, 0.01
+"""Stages of the pace for each control point in the search, and then of the way that is found [-]; distance
+between places where clearance is looked at, about [m]."""
 
 TRIALS, LARGEST_MOVE, DECADES, WIDTH = 500, 0.3, 2.5, 10
 """Moves tried for each control point of every way [-]; the largest [m], by how many powers of ten others are
@@ -288,28 +287,29 @@ def quickest(problem: PlanningProblem, made: Plan, trials: int = TRIALS) -> Quic
         trials: Moves that are tried for each control point of a way.
 
     Raises:
-        PlanError: No way keeps the clearance, or the motion found does not stand the check.
+        PlanError: No way that was found stands the check of its clearance.
     """
     team = team_of(problem, sampled(made))
     found: dict[str, tuple[float, FloatArray]] = {}
     for name, path in starting_ways(problem, made, team):
-        points = control_points(path, team.scale)
+        points, length = control_points(path, team.scale)
         m = len(points)
-        stages, checks = (shares_of(k * m, m) for k in (STAGES, FINE))
+        stages, checks = shares_of(STAGES * m, m), shares_of(int(length / CHECK_STEP) + m, m)
         seconds, lack = improve(team, stages, checks, points, trials * m, np.random.default_rng(0))
         if lack == 0.0:
             found[name] = seconds, points
-    if not found:
-        raise PlanError(f"no way with a clearance of {team.clearance:.3g} m was found")
-    points = min(found.values(), key=lambda way: way[0])[1]
-    seconds, rows = timed(team, points)
-    seconds *= largest_share(problem, rows, seconds)
     room = max(team.clearance - RESERVE, 0.0)
     narrow = replace(problem, workspace=problem.workspace.buffer(-room, quad_segs=32))
-    inner = rows[[exempt(team, z, points) > team.clearance for z in rows]]
-    if not min(least_distances(problem, rows).min(), least_distances(narrow, inner).min()) > 0.0:
-        raise PlanError(f"on the quickest way found bodies meet, or come nearer to a wall than {room:.3g} m")
-    return Quickest(seconds, points, {name: way[0] for name, way in found.items()}, room)
+    while found:
+        points = found[best := min(found, key=lambda name: found[name][0])][1]
+        seconds, rows = timed(team, points)
+        # Where the exemption ends, clearance may change by more between two places than is kept in reserve.
+        inner = rows[[exempt(team, z, points) > 2.0 * team.clearance for z in rows]]
+        if min(least_distances(problem, rows).min(), least_distances(narrow, inner).min()) > 0.0:
+            ways = {name: way[0] for name, way in found.items()}
+            return Quickest(seconds * largest_share(problem, rows, seconds), points, ways, room)
+        del found[best]
+    raise PlanError(f"no way was found that stands the check of a clearance of {room:.3g} m")
 
 
 def team_of(problem: PlanningProblem, judged: FloatArray) -> Team:
@@ -352,11 +352,11 @@ def starting_ways(problem: PlanningProblem, made: Plan, team: Team) -> Iterator[
             yield name, shortened(team.arrays, grid, path, team.scale, BODY_GAP, 0.01, uniforms)
 
 
-def control_points(path: FloatArray, scale: FloatArray) -> FloatArray:
-    """Return control points at equal steps of the scaled length of a path, its ends included."""
+def control_points(path: FloatArray, scale: FloatArray) -> tuple[FloatArray, float]:
+    """Return control points at equal steps of the scaled length of a path, ends included, and it [m]."""
     places = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(path, axis=0) * scale, axis=1)))
     at = np.linspace(0.0, places[-1], int(np.clip(places[-1] / SPACING, FEWEST, MOST)))
-    return np.stack([np.interp(at, places, column) for column in path.T], axis=1)
+    return np.stack([np.interp(at, places, column) for column in path.T], axis=1), float(places[-1])
 
 
 def timed(team: Team, points: FloatArray) -> tuple[float, FloatArray]:
@@ -399,10 +399,9 @@ def largest_share(problem: PlanningProblem, rows: FloatArray, seconds: float) ->
 
 
 def quickest_tasks() -> list[Task]:
-    """The judge on shipped teams, plans of these without choices for time, and random questions."""
+    """The judge on shipped teams, and then on random questions."""
     return [
         *(Task(f"smooth/judge/{team}", partial(_judge, team)) for team in QUICKEST),
-        *(Task(f"smooth/choices/{team}", partial(_without_choices, team)) for team in QUICKEST),
         Task("smooth/questions", _questions, alone=True),
     ]
 
@@ -431,12 +430,6 @@ def judged(scenario: Scenario) -> tuple[float, Quickest] | None:
     return answer.plan.motion.duration, quickest(problem, answer.plan)
 
 
-def _without_choices(team: str, _: Sequence[Row]) -> list[Row]:
-    """Return what plans take without the choices of cells and ways that shorten their motions."""
-    problem = planning_problem(limited_scenario(team))
-    return stage_rows(f"smooth/choices/{team}", problem, TIME_LIMIT, CHOICES)
-
-
 def _questions(rows: Sequence[Row]) -> list[Row]:
     """Return what the motions of the first random questions take beside the judge's, if it may judge."""
     ratios = {row.name: row.ratio or inf for row in rows}
@@ -445,14 +438,14 @@ def _questions(rows: Sequence[Row]) -> list[Row]:
             raise PlanError(f"{team}: the judge may judge once it is within {WITHIN:g} of what is recorded")
     found, ask = list[Row](), partial(in_own_process, question_judged, limit=TIME_LIMIT)
     with ThreadPoolExecutor(2) as pool:
-        for first in count(0, 2):
-            for number, done in enumerate(pool.map(ask, (first, first + 1)), first):
-                if done.value is not None and len(found) < ASKED:
-                    ours, best = done.value
-                    name = f"smooth/questions/{number}/motion"
-                    found.append(Row(name, ours, "s", "quickest", best.seconds))
-            if len(found) == ASKED:
-                break
+        pending = deque((number, pool.submit(ask, number)) for number in range(3))
+        while len(found) < ASKED:
+            number, done = pending.popleft()
+            pending.append((pending[-1][0] + 1, pool.submit(ask, pending[-1][0] + 1)))
+            if (answer := done.result().value) is not None:
+                name = f"smooth/questions/{number}/motion"
+                found.append(Row(name, answer[0], "s", "quickest", answer[1].seconds))
+        pool.shutdown(cancel_futures=True)
     times = [row.ratio or inf for row in found]
     largest = Row("smooth/questions/all/largest", max(times), "of the quickest")
     return [*found, Row("smooth/questions/all/median", float(np.median(times)), "of the quickest"), largest]

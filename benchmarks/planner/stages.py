@@ -1,4 +1,4 @@
-"""What each stage of path improvement is worth: plans with one stage switched off at a time.
+"""What each stage that makes plans quicker is worth: plans with one stage switched off at a time.
 
 A stage is switched off in the process that measures it, by replacing the function or the constant that makes
 it work. Each variant is compared with ``everything``: estimated transport time, margin and planning time.
@@ -6,8 +6,8 @@ it work. Each variant is compared with ``everything``: estimated transport time,
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
-from contextlib import ExitStack
+from collections.abc import Sequence
+from contextlib import ExitStack, suppress
 from dataclasses import dataclass
 from math import inf
 from typing import Any
@@ -16,10 +16,10 @@ from unittest.mock import patch
 import numpy as np
 
 from benchmarks.isolated import in_own_process
-from benchmarks.planner.cases import Case
 from benchmarks.planner.family import first_question
 from benchmarks.planner.ours import Planned, plan_repeatedly
 from benchmarks.rows import Row
+from benchmarks.smooth import QUICKEST, limited_scenario
 from benchmarks.tasks import Task
 from coop_drake.answers import Plan, PlanningProblem
 from coop_drake.answers.motion import WAITING, Motion, TeamGains
@@ -30,10 +30,8 @@ from coop_drake.planning.motion_limits import team_chains
 from coop_drake.planning.sampling import band
 from coop_drake.planning.sampling.band import smoothed
 from coop_drake.planning.transitions import make_plan
+from coop_drake.plant import planning_problem
 from coop_drake.tree.arrays import FloatArray, IntArray
-
-CASES = ("base", "tight", "three", "elbow", "warehouse")
-"""Shipped scenarios that have a plan."""
 
 REPEATS = 2
 """Plans of every variant; the shortest planning time counts, for the machine is never idle."""
@@ -74,26 +72,18 @@ def _aimless_plan(*given: Any, targets: object, **others: Any) -> Plan:
 
 
 def _motion_along_paths(plan: Plan, problem: PlanningProblem, limits: FloatArray, gains: TeamGains) -> Motion:
-    """Return a motion with the times of the first phase if the way is not moved in it, only its times are.
-
-    Raises:
-        PlanError: The paths do not enter every cell.
-    """
+    """Return a motion with the times of the first phase if the way is not moved in it, only its times are."""
     chains, cells, table = team_chains(problem), motion.cell_sets(plan, 0.0), motion.LIMIT_SHARE * limits
     free = np.where([True, True, False], table, inf)
     for finer in range(motion.FINER + 1):
         points = motion.first_points(plan, cells, chains, table, motion.OVERLAP_SPANS * 2**finer)
-        try:
+        with suppress(PlanError):
             program = motion._Program(cells, chains, free, WAITING, points, motion.EVENNESS, parts=1)
             break
-        except PlanError:
-            if finer == motion.FINER:
-                raise
     program.held.reshape(points.shape)[:, :-1] = True
     program.solve(motion.WEIGHTS[0])
     made = motion.uniform_points(program.points, motion.PERIOD)
-    knots = np.arange(len(points) - 2.0)
-    windows = np.interp(program.windows, knots, program.points[1:-1, -1])
+    windows = np.interp(program.windows, np.arange(len(points) - 2.0), program.points[1:-1, -1])
     period, rates = float(made[2, -1] - made[1, -1]), program.kappa
     return Motion(made[:, :-1], period, windows, rates, WAITING, motion.BRAKE_RAMP, 1.0, gains)
 
@@ -107,17 +97,11 @@ STAGES: dict[str, tuple[Replacement, ...]] = {
         Replacement(sampled_search, "moved_from_obstacles", lambda problem, path, gap, share: path),
     ),
     "no_covering": (Replacement(cell_selection, "cover_path", lambda *asked: None),),
-}
-"""For every variant what is replaced; the name says which stage is missing."""
-
-CHOICES: dict[str, tuple[Replacement, ...]] = {
-    "everything": (),
-    "no_candidates": STAGES["no_candidates"],
     "no_times_of_boxes": (Replacement(cell_selection, "choose_boxes", _few_wide_boxes),),
     "no_targets": (Replacement(cell_selection, "make_plan", _aimless_plan),),
     "no_moved_way": (Replacement(motion, "quickest_motion", _motion_along_paths),),
 }
-"""Likewise for choices of cells and ways that are made so that the motion takes less time."""
+"""For every variant what is replaced; the name says which stage is missing."""
 
 
 def stage_tasks(limit: float) -> list[Task]:
@@ -126,28 +110,25 @@ def stage_tasks(limit: float) -> list[Task]:
     Args:
         limit: CPU time of all variants of a case together [s].
     """
-    return [_task(name, limit) for name in CASES]
+    return [_task(name, limit) for name in QUICKEST]
 
 
 def _task(name: str, limit: float) -> Task:
     def measure(rows: Sequence[Row]) -> Sequence[Row]:
-        return stage_rows(f"planner/stages/{name}", Case(name).problem(), limit)
+        return stage_rows(f"smooth/stages/{name}", planning_problem(limited_scenario(name)), limit)
 
-    return Task(f"planner/stages/{name}", measure)
+    return Task(f"smooth/stages/{name}", measure)
 
 
-def stage_rows(
-    name: str, problem: PlanningProblem, limit: float, variants: Collection[str] = STAGES.keys()
-) -> list[Row]:
+def stage_rows(name: str, problem: PlanningProblem, limit: float) -> list[Row]:
     """Plan with every stage switched off in turn, in one process of its own.
 
     Args:
         name: What the rows' names begin with.
         problem: The question.
         limit: CPU time of all variants together [s].
-        variants: Of ``STAGES`` or ``CHOICES``.
     """
-    done = in_own_process(plan_variants, problem, tuple(variants), limit=limit).value
+    done = in_own_process(plan_variants, problem, limit=limit).value
     if done is None:
         return [Row(f"{name}/everything/answer", 0.0, f"none within {limit:g} CPU s")]
     rows = []
@@ -164,10 +145,10 @@ def stage_rows(
     return rows
 
 
-def plan_variants(problem: PlanningProblem, variants: Sequence[str]) -> dict[str, Planned]:
+def plan_variants(problem: PlanningProblem) -> dict[str, Planned]:
     """Plan with every stage switched off in turn, after a small question has loaded the compiled kernels."""
     plan_repeatedly(first_question(), 1, PATIENCE)
-    return {variant: without_stage(problem, variant) for variant in variants}
+    return {variant: without_stage(problem, variant) for variant in STAGES}
 
 
 def without_stage(problem: PlanningProblem, variant: str) -> Planned:
@@ -175,9 +156,9 @@ def without_stage(problem: PlanningProblem, variant: str) -> Planned:
 
     Args:
         problem: The question.
-        variant: One of ``STAGES`` or ``CHOICES``.
+        variant: One of ``STAGES``.
     """
     with ExitStack() as stack:
-        for replaced in {**STAGES, **CHOICES}[variant]:
+        for replaced in STAGES[variant]:
             stack.enter_context(patch.object(replaced.module, replaced.name, replaced.value))
         return min(plan_repeatedly(problem, REPEATS, PATIENCE), key=lambda planned: planned.cpu_seconds)

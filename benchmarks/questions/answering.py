@@ -217,13 +217,7 @@ def answer(question: Question, settings: QuestionSettings) -> tuple[QuestionReco
 def planned_in_time(
     scenario: Scenario, problem: PlanningProblem, limit: float
 ) -> tuple[PlanningResult, str, bool]:
-    """Return an answer, undecided without a certified way in time; a remark; whether the planner failed.
-
-    Args:
-        scenario: Whose gains are used.
-        problem: What is asked.
-        limit: Time after which an answer counts as undecided, or a plan is not improved any more [CPU s].
-    """
+    """Return an answer, undecided without a way in time [CPU s]; a remark; whether the planner failed."""
     end, late = process_time() + limit, ""
 
     def check_time(phase: str, fraction: float) -> None:

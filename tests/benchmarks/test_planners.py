@@ -16,7 +16,9 @@ from benchmarks.planner.head_to_head import judged
 from benchmarks.planner.ours import Planned, plan_repeatedly
 from benchmarks.planner.stages import STAGES, without_stage
 from benchmarks.questions.peers import PeerRun, fault_of, run_ompl, run_trees
+from benchmarks.smooth import limited_scenario
 from coop_drake.planning.sampling.collision import grid_for_team, is_free
+from coop_drake.plant import planning_problem
 from coop_drake.tree.component_tree import team_arrays
 
 EASY = first_question()
@@ -54,6 +56,17 @@ def test_a_plan_is_found_without_any_one_stage(variant):
     assert planned.answer == "found"
     assert planned.transport_seconds > 0.0
     assert all(getattr(module, name) is value for module, name, value in replaced)
+
+
+@pytest.mark.slow
+def test_motions_take_longer_without_any_choice_that_shortens_them():
+    problem = planning_problem(limited_scenario("elbow"))
+    quickest = without_stage(problem, "everything").transport_seconds
+    choices = ("no_candidates", "no_times_of_boxes", "no_targets", "no_moved_way")
+    seconds = [without_stage(problem, choice).transport_seconds for choice in choices]
+    assert 0.0 < quickest < min(seconds)
+    assert max(seconds) == seconds[-1]
+    assert without_stage(problem, "everything").transport_seconds == quickest
 
 
 @pytest.mark.parametrize("run", [run_trees, run_ompl])

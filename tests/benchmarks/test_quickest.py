@@ -64,8 +64,8 @@ def test_a_way_that_begins_in_a_wall_is_mended_and_keeps_the_clearance():
     block = box(4.0, 0.0, 5.0, 1.9)
     problem = replace(problem, workspace=problem.workspace.difference(block).buffer(0.0))
     team = team_of(problem, problem.start[None])
-    points = control_points(np.array([problem.start, [7.0, 2.0, 0.0, 0.0, 0.0]]), team.scale)
-    shares = shares_of(5 * len(points), len(points)), shares_of(20 * len(points), len(points))
+    points = control_points(np.array([problem.start, [7.0, 2.0, 0.0, 0.0, 0.0]]), team.scale)[0]
+    shares = shares_of(5 * len(points), len(points)), shares_of(600, len(points))
     assert improve(team, *shares, points, 0, np.random.default_rng(0))[1] > 0.0
     seconds, lack = improve(team, *shares, points, 20_000, np.random.default_rng(0))
     assert (lack, seconds > 6.0) == (0.0, True)
