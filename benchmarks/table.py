@@ -84,7 +84,7 @@ TOPICS = {
     "deployed": "shipped transports under the preset mobile_base, at 10 and 20 ms, beside the ideal ones",
     "compiled": "runs of the compiled loop beside those of Drake's: how many a second, and their differences",
     "alarms": "levels of monitors: 400 certified runs of each shipped transport; the chance of false alarms",
-    "smooth": "teams that pass, beside the quickest motions found; single stages off; squeezing; three speeds",
+    "smooth": "teams that pass beside the quickest motions found; single stages off; squeezing; three speeds",
     "words": "teams that pass, with a robot deaf or mute: how far they part; cost of their runs",
     "apart": "processes of their own: cost of messages and of 2, 4 and 8 robots; kills; limp robots; stops",
     "adversaries": "altered plans and proofs beside the exact checker; how long it checks random answers",
