@@ -10,13 +10,9 @@ from pydrake.systems.primitives import ConstantVectorSource
 
 from coop_drake.compiled_loop import prepare
 from coop_drake.compiled_loop import run as compiled_run
-from coop_drake.compiled_loop.arrays import plant_room, robot_room
-from coop_drake.compiled_loop.loop import advance, update
-from coop_drake.compiled_loop.running import believed, departures_of, memory_of, nominal_of
 from coop_drake.compiled_loop.watching import left_by_all
 from coop_drake.laws import FixedGains, ScheduledGains
 from coop_drake.laws.words import ARRIVED
-from coop_drake.plant.team import displacement
 from coop_drake.scenario import (
     ActuatorLimits,
     BlockedWheels,
@@ -40,6 +36,7 @@ from tests.support.hand_over import assert_certified
 from tests.support.motions import motion_under_budget
 from tests.support.run_checks import verified_run
 from tests.support.small_loop import small_maps, small_problem
+from tests.support.stepped import samples
 
 RATE = 100.0
 RUNS = {}
@@ -336,22 +333,16 @@ def budgeted():
 
 def run_unwatched(transport, deployment):
     """Whether the supervisor says that the team has arrived, when, and z then, or after ``SECONDS``."""
-    departures = departures_of(transport, deployment)
-    period, memory = float(departures.times[0]), memory_of(transport, departures)
-    memory.state[transport.order] += displacement(deployment, len(transport.order))
-    team, nominal = believed(transport.team, deployment.mass_error), nominal_of(transport, deployment)
-    room, motion = robot_room(team, memory), plant_room(team, transport.plant)
-    for sample in range(round(SECONDS / period) + 1):
-        cell = int(memory.current[sample % len(memory.current), 0])
-        z = memory.state[transport.order]
-        left = cell + 1 == len(transport.plan.cells) and left_by_all(cell, memory.channels)
+    last = len(transport.plan.cells) - 1
+    for time, memory in samples(transport, deployment):
+        row = round(time / deployment.period) % len(memory.current)
+        cell, z = int(memory.current[row, 0]), memory.state[transport.order]
+        left = cell == last and left_by_all(cell, memory.channels)
         if left or memory.supervised[0] == ARRIVED:
-            return True, sample * period, z
-        if not np.isfinite(memory.state).all():
+            return True, time, z
+        if time > SECONDS:
             break
-        update(transport.cells, team, nominal, departures, room, memory, sample)
-        advance(sample, team, transport.plant, departures, memory, motion)
-    return False, sample * period, z
+    return False, time, z
 
 
 def off(transport, z):

@@ -1,66 +1,100 @@
-"""Each law of docs/equations.md is the function that runs: what uses a law changes with the law.
+"""Each law of docs/equations.md is the function that runs: blocks, compiled loop and planner call it.
 
-A second copy of a formula, in a block, in the planner or in the compiled loop, would not change with the law.
+A second copy of a formula, in a block, in the planner or in the compiled loop, would take the law's place.
 """
 
-import json
-import os
+import ast
 import re
-import subprocess
-import sys
+from functools import cache
 from pathlib import Path
 
 import pytest
 
-pytestmark = pytest.mark.slow
+import coop_drake
 
-ROOT = Path(__file__).parents[2]
-EQUATIONS = (ROOT / "docs" / "equations.md").read_text(encoding="utf-8")
-LAWS = sorted(
-    set(re.findall(r"`(laws/\w+)\.py: (\w+)`", EQUATIONS.split("## ")[0])) - {("laws/gains", "FixedGains")}
-)
-
-MOTION = {
-    "energy_margin",
-    "tracking_energy",
-    "governed_acceleration",
-    "governor_velocity",
-    "driving_margin",
-    "speed_damping",
-    "limited_row",
-    "axis_bounds",
-    "track_axis",
-}
-"""Laws of how the object and the axes move; planner and loop need them."""
+ROOT = Path(coop_drake.__file__).parent
+EQUATIONS = (ROOT.parent / "docs" / "equations.md").read_text(encoding="utf-8")
+LAWS = set(re.findall(r"`laws/\w+\.py: (\w+)`", EQUATIONS.split("## ")[0])) - {"FixedGains"} | {"axis_ready"}
 
 READINESS = {"clearance_margin", "interval_margin", "axis_ready"}
 """Laws of when a cell may be left."""
 
+EFFORTS = {"wrench_share", "acceleration_at", "estimate_object", "robot_effort"}
+"""Laws of what moves a robot, which neither the estimate of times nor that of a stall needs."""
+
 USERS = {
-    "named": MOTION | READINESS | {"wrench_share", "acceleration_at", "estimate_object", "robot_effort"},
-    "compiled": MOTION | READINESS | {"wrench_share", "acceleration_at", "estimate_object", "robot_effort"},
-    "estimate": MOTION | READINESS,
-    "stall": {"energy_margin", "tracking_energy", "axis_bounds", "track_axis"} | READINESS,
+    (
+        "systems",
+        "ReferenceGovernor",
+        "AxisPpc",
+        "WrenchLaw",
+        "ObjectEstimator",
+        "RobotEffort",
+        "ReadyMonitor",
+    ): LAWS,
+    ("compiled_loop", "update", "watch"): LAWS,
+    ("planning", "cross_cell"): LAWS - EFFORTS,
+    ("simulation", "blocking_margin"): {"energy_margin", "tracking_energy", "axis_bounds", "track_axis"}
+    | READINESS,
 }
-"""What must change with a law."""
+"""Where functions and blocks stand, and the laws that they must call, themselves or through others."""
 
 
-@pytest.fixture(scope="module")
-def changed():
-    """For each law the results that changed with it, computed where laws are plain Python functions."""
-    names = [f"coop_drake.{module.replace('/', '.')}:{name}" for module, name in LAWS]
-    names.append("coop_drake.laws.readiness:axis_ready")
-    done = subprocess.run(
-        [sys.executable, "-m", "tests.support.changed_laws", *names],
-        cwd=ROOT, env={**os.environ, "NUMBA_DISABLE_JIT": "1"}, capture_output=True, text=True, check=True,
-    )  # fmt: skip
-    return {name.split(":")[1]: set(results) for name, results in json.loads(done.stdout).items()}
+@cache
+def modules() -> dict[str, ast.Module]:
+    """The package's modules by their names below ``coop_drake``, such as ``laws.ppc``."""
+    return {
+        ".".join(path.relative_to(ROOT).with_suffix("").parts): ast.parse(path.read_text(encoding="utf-8"))
+        for path in ROOT.rglob("*.py")
+        if path.name != "__init__.py"
+    }
 
 
-def test_the_table_of_equations_names_the_laws_of_the_loop():
-    assert {name for _, name in LAWS} | {"axis_ready"} == USERS["named"]
+@cache
+def known(module: str) -> dict[str, tuple[str, str]]:
+    """Where functions and classes stand that a module defines or imports, by the names that it gives them."""
+    found = {}
+    for node in ast.walk(modules()[module]):
+        if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("coop_drake."):
+            source = node.module.removeprefix("coop_drake.")
+            for one in node.names:
+                found[one.asname or one.name] = (source, one.name)
+    return found | {one.name: (module, one.name) for one in modules()[module].body if hasattr(one, "name")}
 
 
-@pytest.mark.parametrize("user", sorted(USERS))
-def test_changes_of_laws_reach(changed, user):
-    assert {law for law, results in changed.items() if user in results} == USERS[user]
+def body_of(place: tuple[str, str]) -> tuple[str, ast.AST] | None:
+    """The definition at a place, and its module; packages show what their modules define."""
+    source, name = place
+    for module in (
+        [source] if source in modules() else [one for one in modules() if one.startswith(f"{source}.")]
+    ):
+        for one in modules()[module].body:
+            if getattr(one, "name", None) == name:
+                return module, one
+    return None
+
+
+def reached(user: str, names: set[str]) -> set[str]:
+    """The laws that functions or blocks call, or that is called by what they call, and so on."""
+    left, laws, seen = {(user, name) for name in names}, set(), set()
+    while left:
+        seen.add(place := left.pop())
+        if (found := body_of(place)) is None:
+            continue
+        module, body = found
+        laws |= {place[1]} if module.startswith("laws.") else set()
+        for part in ast.walk(body):
+            if isinstance(part, ast.Name) and part.id in known(module):
+                left.add(known(module)[part.id])
+            elif isinstance(part, ast.Attribute) and isinstance(part.value, ast.Name):
+                source = known(module).get(part.value.id)
+                if source is not None and ".".join(source) in modules():
+                    left.add((".".join(source), part.attr))
+        left -= seen
+    return laws
+
+
+@pytest.mark.parametrize("user", USERS, ids=lambda user: user[0])
+def test_laws_are_called_and_not_written_again(user):
+    assert len(LAWS) > 15
+    assert LAWS & reached(user[0], set(user[1:])) == USERS[user]

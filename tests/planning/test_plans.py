@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from shapely import LineString, Point, box
+from shapely import Point, box
 
 from coop_drake.answers.plan import check_plan
 from coop_drake.errors import PlanError, StallError
-from coop_drake.geometry import BoundaryDistance, PassageFinder
+from coop_drake.geometry import BoundaryDistance
 from coop_drake.laws import FixedGains, ScheduledGains, transition_gains
 from coop_drake.laws.gains import schedule_of
 from coop_drake.planning import Channel, FreeBox, cell_selection, make_plan, plan_time, reschedule
@@ -26,7 +26,6 @@ from paper.governor_run import run_governor
 from tests.support.cases import case
 from tests.support.channels import bent_channel
 from tests.support.free_positions import FreePositions
-from tests.support.point_mass import build_fields, carry_out, straight_fields
 from tests.support.small_plan import small_plan
 
 # From a channel to a plan: targets, goal intervals, regions, gains; and what is refused.
@@ -52,50 +51,6 @@ def corridor(widths=(1.0, 1.0, 1.0), *, turn=0.4, goal_joints=(None, None)):
 
 def plan_of(problem, channel, gain_set=None):
     return make_plan(problem, channel, gain_set or ScheduledGains(), gain_set_name="scheduled")
-
-
-@pytest.fixture(scope="module")
-def bent_plan():
-    return plan_of(*bent_channel())
-
-
-def test_neighbours_share_targets_with_room_around_them(bent_plan):
-    for k, transition in enumerate(bent_plan.transitions[:-1]):
-        here, after = bent_plan.cells[k : k + 2]
-        room = min(BoundaryDistance(cell.tidied)(transition.target) for cell in (here, after))
-        assert transition.inradius == pytest.approx(room)
-        assert transition.inradius > 0.05
-        assert LineString(transition.path).length == transition.length
-        np.testing.assert_array_equal(transition.path[-1], transition.target)
-
-
-def test_goal_intervals_are_what_neighbouring_slices_share(bent_plan):
-    for transition, here, after in zip(
-        bent_plan.transitions, bent_plan.cells, bent_plan.cells[1:], strict=False
-    ):
-        np.testing.assert_array_equal(transition.goal_lower, np.maximum(here.lower, after.lower))
-        np.testing.assert_array_equal(transition.goal_upper, np.minimum(here.upper, after.upper))
-
-
-def test_necks_and_lengths_are_those_of_passages_in_the_tidied_cells(bent_plan):
-    entry = bent_plan.start[:2]
-    for cell, transition in zip(bent_plan.cells, bent_plan.transitions, strict=True):
-        passage = PassageFinder(cell.tidied).find(entry, transition.target)
-        assert (transition.neck, transition.length) == (passage.clearance, passage.length)
-        assert transition.only_angles == (transition.length < 1e-9)
-        entry = transition.target
-
-
-def test_a_made_plan_passes_the_checks_and_reaches_its_goal():
-    plan = plan_of(*corridor())
-    check_plan(plan, "plan")
-    transport = carry_out(plan, straight_fields(plan))
-    assert transport.stuck is None
-    assert transport.least_energy_margin >= 0.0
-    assert transport.least_cell_clearance > 0.0
-    assert transport.least_funnel_gap > 0.0
-    assert np.hypot(*(transport.position - plan.goal_pose[:2])) <= 0.01
-    assert abs(transport.axes[0] - plan.goal_pose[2]) <= 0.02
 
 
 @pytest.mark.parametrize("turns", [-2, -1, 1, 3])
@@ -366,23 +321,6 @@ def test_speed_in_a_long_aisle_is_that_of_a_governed_point(gain_set):
         gains=(gains.stiffness, gains.damping, gains.governor_gain, 0.0),
     )  # fmt: skip
     assert run.velocity[-1, 0] == pytest.approx(speed_per_clearance(gains) * half_width, rel=1e-3)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("gain_set", [FixedGains(), ScheduledGains()])
-def test_the_estimate_is_that_of_a_transport_through_maps(gain_set):
-    plan = make_plan(*bent_channel(cells=4), gain_set, gain_set_name="any")
-    transport = carry_out(plan, build_fields(plan))
-    assert transport.stuck is None
-    assert transport.least_energy_margin > 0.0
-    assert plan_time(plan) == pytest.approx(float(np.sum(transport.durations)), rel=0.1)
-
-
-def test_without_walls_in_the_way_every_transition_is_estimated_closely():
-    plan = small_plan(("arm",))
-    transport = carry_out(timed(plan), straight_fields(plan))
-    estimates = [transition.estimated_time for transition in timed(plan).transitions]
-    np.testing.assert_allclose(estimates, transport.durations, atol=0.06)
 
 
 def test_a_transition_that_is_never_left_gets_the_rule_and_two_minutes():

@@ -13,10 +13,7 @@ from coop_drake.laws.gains import schedule_of, scheduled_governor
 from coop_drake.laws.ppc import ramped_gain
 from coop_drake.laws.readiness import clearance_margin
 from paper.governor_run import box_clearance, run_governor, straight_field
-from tests.support.hand_over import energy_surplus, funnel_surpluses
-from tests.support.point_mass import carry_out, straight_fields
 from tests.support.prescribed import prescribed_acceleration, prescribed_energy
-from tests.support.random_plan import random_plan
 
 law = settings(max_examples=200)
 shapes = st.sampled_from(["exponential", "quintic"])
@@ -283,19 +280,3 @@ def test_shares_sum_to_the_command(offsets, com_offset, acceleration, rate, mass
     assert shares[:, :2] == pytest.approx(weights[:, None] * commanded[:2], rel=1e-12, abs=1e-12)
     total = laws.total_wrench(shares, np.array(offsets), com_offset, 0.0)
     assert total == pytest.approx(commanded, rel=1e-12, abs=1e-10)
-
-
-@pytest.mark.slow
-@settings(max_examples=12)
-@given(st.integers(0, 2**32 - 1))
-def test_every_hand_over_of_a_random_plan_is_safe_and_comes(seed):
-    plan = random_plan(np.random.default_rng(seed), ("a::one", "b::one"))
-    transport = carry_out(plan, straight_fields(plan), step=0.01)
-    assert transport.stuck is None
-    assert len(transport.hand_overs) == len(plan.cells)
-    for index, state in enumerate(transport.hand_overs[:-1]):
-        assert energy_surplus(plan, index, state[:2], state[2:4], state[4:6]) >= -1e-12
-        assert funnel_surpluses(plan, index, state[6:9], state[9:]).min() >= -1e-12
-    assert transport.least_energy_margin >= 0.0
-    assert transport.least_cell_clearance > 0.0
-    assert transport.least_funnel_gap > 0.0
