@@ -274,47 +274,6 @@ def test_warming_up_leaves_nothing_behind(tmp_path, monkeypatch):
     assert list(tmp_path.iterdir()) == []
 
 
-MISTAKES = {
-    "a start outside": (
-        {"start": {"object": {"x": 0.1, "y": 2.0, "theta": 0.0}, "joints": ROOM["start"]["joints"]}},
-        "start",
-        "0.1",
-    ),
-    "welds before models": ({"directives": ROOM["directives"][::-1]}, "directives", "robot_1"),
-}
-
-
-@pytest.mark.parametrize("mistake", MISTAKES)
-def test_bad_input_is_answered_with_file_key_value_and_what_is_allowed(mistake, tmp_path):
-    sections, key, value = MISTAKES[mistake]
-    path = write_scenario(tmp_path / "wrong.scenario.yaml", **sections)
-    result = invoke("run", path, "--out", tmp_path / "out", "--json")
-    assert result.exit_code == 2
-    facts = json.loads(result.stdout)
-    assert facts["file"] == str(path)
-    assert key in facts["key"]
-    assert value in facts["error"]
-    assert facts["allowed"]
-    assert "Traceback" not in result.stderr
-    assert str(path) in result.stderr
-    assert not (tmp_path / "out").exists()
-
-
-def test_a_missing_file_and_an_unknown_gain_set_are_bad_input(room, tmp_path):
-    missing = invoke("plan", tmp_path / "nowhere.yaml", "--json")
-    assert missing.exit_code == 2
-    assert "nowhere.yaml" in json.loads(missing.stdout)["error"]
-    assert "the file: no such file; expected a readable file" in json.loads(missing.stdout)["error"]
-    gains = invoke("plan", room, "--gains", "tabel_2", "--json")
-    assert gains.exit_code == 2
-    facts = json.loads(gains.stdout)
-    assert (facts["key"], facts["value"]) == ("--gains", "'tabel_2'")
-    assert facts["allowed"] == "one of scheduled, table_2, or a file with a gain set"
-    whole = invoke("plan", room, "--gains", room, "--json")
-    assert whole.exit_code == 2
-    assert "…" in json.loads(whole.stdout)["value"]
-
-
 def test_a_plan_of_another_scenario_is_bad_input(finished, room, tmp_path):
     out, _ = finished
     other = write_scenario(

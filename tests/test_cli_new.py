@@ -77,17 +77,6 @@ def test_a_floor_plan_takes_the_place_of_the_rooms(tmp_path):
     assert load_scenario(path).workspace.polygon.area == pytest.approx(60.0)
 
 
-def test_a_floor_plan_may_stand_where_the_scenario_goes(tmp_path, monkeypatch):
-    write_svg(tmp_path, '<rect width="10" height="6"/>')
-    monkeypatch.chdir(tmp_path)
-    poses = ["--start", 2, 2, 0, "--goal", 8, 4, 1.57]
-    done = call("mine", "--floor-plan", "hall.svg", "--unit", "m", *poses, "--out", ".")
-    assert done.exit_code == 0, done.output
-    path = tmp_path / "mine.scenario.yaml"
-    assert 'file: "hall.svg"' in path.read_text()
-    assert load_scenario(path).workspace.polygon.area == pytest.approx(60.0)
-
-
 REFUSED = {
     "one robot": (["--robots", 1], "--robots: 1 is not allowed; expected two to six"),
     "no arm": (["--arm", "long"], "is no list of lengths"),
@@ -112,10 +101,6 @@ def test_what_cannot_be_meant_leaves_nothing_behind(tmp_path, monkeypatch, flags
     assert done.exit_code == 2
     assert message in " ".join(done.output.split()).replace("│ ", "")
     assert list(tmp_path.iterdir()) == []
-
-
-def test_a_name_that_is_none_is_refused(tmp_path):
-    assert call("a/b", "--out", tmp_path / "x").exit_code == 2
 
 
 def test_files_are_replaced_only_by_force(tmp_path):

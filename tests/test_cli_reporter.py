@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 import pytest
 import typer
 
@@ -94,12 +92,6 @@ def test_a_run_has_ten_rows_and_names_the_speed_that_is_nearest_to_its_limit():
     assert rows["simulated transport"] == "13.42 s, estimated 13.3 s"
     assert rows["nearest to a limit of motion"] == "rate of left::elbow, 4.00 rad/s, limit 5"
     assert rows["error at the end"] == "0.0056 m, 0.0015 rad"
-
-
-def test_bodies_that_are_never_compared_have_no_clearance():
-    rows = dict(summary_rows(RUN | {"min_body_clearance_m": math.inf}))
-    assert len(rows) == 9
-    assert "smallest clearance between bodies" not in rows
 
 
 def test_more_rows_are_shown_on_demand():

@@ -257,13 +257,3 @@ def test_bars_and_colours_are_for_terminals():
     assert "planning" in seen
     assert "\x1b[1;31mfound" in seen
     assert shown("-q", terminal=True) == ""
-
-
-def test_colours_can_be_switched_off_and_forced():
-    assert "\x1b[1;31m" not in shown(terminal=True, NO_COLOR="1")
-    forced = shown(terminal=False, FORCE_COLOR="1")
-    assert "\x1b[1;31mfound" in forced
-    assert "planning" not in forced
-    dumb = shown(terminal=True, TERM="dumb")
-    assert "\x1b" not in dumb
-    assert "found" in dumb

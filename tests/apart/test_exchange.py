@@ -8,7 +8,7 @@ import pytest
 
 from coop_drake.answers.budget import Budget
 from coop_drake.apart import messages as msg
-from coop_drake.apart.faults import ChannelFaults, ClockFault, Faults, Gap, load_faults
+from coop_drake.apart.faults import ChannelFaults, Faults, Gap, load_faults
 from coop_drake.apart.membership import Membership, Processes
 from coop_drake.apart.node import FOLLOWS, OUTSIDE, STANDS
 from coop_drake.apart.processes import tolerated_age
@@ -188,26 +188,11 @@ def test_the_drives_brake_once_a_robot_is_missing_for_longer_than_is_tolerated()
     assert book.told[1:] == ["robot 1 is there again", "the team goes on at t = 1.1 s"]
 
 
-def test_where_nothing_is_tolerated_the_drives_brake_at_the_first_sample_without_an_answer():
-    membership = Book(tolerated=0.0).membership
-    assert not membership.too_long(0.3, 0.1 + 0.2)
-    membership.lose({1: 0.395})
-    membership.see(0.4, {0: FOLLOWS}, rests=False)
-    assert membership.stopped
-
-
 @pytest.mark.parametrize(("planned", "tolerated"), [(None, 0.02), (0.01, 0.0), (0.025, 0.015), (0.005, 0.0)])
 def test_a_budget_tolerates_what_its_delay_leaves_beside_that_of_measurements(planned, tolerated):
     deployment = Deployment(control_rate=200.0, measurements=Measurements(delay=0.01))
     found = tolerated_age(deployment, None if planned is None else Budget(delay=planned))
     assert found == pytest.approx(tolerated)
-
-
-def test_without_the_supervisor_the_drives_do_not_brake():
-    membership = Book().membership
-    membership.lose({msg.SUPERVISOR: 0.3})
-    membership.see(5.0, {0: FOLLOWS, 1: FOLLOWS}, rests=True)
-    assert (membership.stopped, membership.trouble) == (False, "")
 
 
 @pytest.mark.parametrize(("rejoin", "ended"), [(0.0, set()), (60.0, {1})])
@@ -303,11 +288,6 @@ def test_nothing_passes_a_gap_but_what_the_log_needs():
     assert sending(faults, [msg.Effort(k, 0.0, (), 0, (), ()) for k in range(8)], 0, msg.WORLD)[1] == 5
     assert sending(faults, [msg.Telemetry(k, 0.0, (), 0, 0, ()) for k in range(8)], 0, msg.WORLD)[1] == 8
     assert sending(faults, [msg.Welcome()] * 8, msg.WORLD, 0)[0] == [(0,)] * 8
-
-
-def test_a_clock_shows_its_own_time():
-    faults = Faults(clocks=(ClockFault(1, offset=0.5, drift=0.01),))
-    assert (faults.clock(0, 3.0), faults.clock(1, 3.0)) == (3.0, pytest.approx(3.53))
 
 
 @pytest.mark.parametrize(

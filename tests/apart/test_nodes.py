@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from benchmarks.one_process import DirectExchange, simulate_apart
-from coop_drake import Found, load_scenario, plan
 from coop_drake.answers.budget import Budget
 from coop_drake.apart import RobotNode, SupervisorNode
 from coop_drake.apart.messages import AtRest, Begin, Place, Ready, Switch
@@ -16,12 +15,8 @@ from coop_drake.apart.supervisor import SPARE
 from coop_drake.diagram import build_station, control_period
 from coop_drake.diagram.robot_controller import robot_knowledge
 from coop_drake.errors import ScenarioError
-from coop_drake.scenario import Control, Deployment, Hold, Measurements, Messages, RobotDepartures, Silence
-from coop_drake.scenario.deployment import ActuatorLimits, Deafness
-from coop_drake.simulation import build_maps, simulate
-from tests.support.same_runs import differences
-from tests.support.scenarios import write_scenario
-from tests.support.small_loop import sampled, small_maps, small_problem
+from coop_drake.scenario import Measurements, RobotDepartures
+from tests.support.small_loop import sampled, small_maps
 
 PERIOD = 0.01
 
@@ -246,24 +241,6 @@ def test_a_clock_that_jumps_is_seen_by_the_numbers_of_samples(last, jumps):
     assert doubts == [False, False, jumps]
 
 
-@pytest.mark.no_cover
-@pytest.mark.slow
-def test_whenever_the_drives_brake_a_team_that_rests_returns_to_its_cell(tmp_path):
-    goal = {"object": {"x": 3.5, "y": 2.0, "theta": 1.5}}
-    file = write_scenario(tmp_path / "room.scenario.yaml", goal=goal, deployment={"preset": "mobile_base"})
-    scenario = load_scenario(file)
-    answer = plan(scenario, gains="scheduled")
-    assert isinstance(answer, Found)
-    gaps = [(round(begin * 200), round(begin * 200) + 60) for begin in (0.8, 3.8)]
-    exchange = DirectExchange(gaps)
-    log = simulate_apart(scenario, answer.plan, build_maps(answer.plan), exchange=exchange)
-    stops = exchange.membership.stops
-    assert log.reached, log.violation
-    assert len(stops) == 2
-    assert all(stop.returned for stop in stops)
-    assert min(log.workspace_clearance.min(), log.body_clearance.min()) > 0.0
-
-
 class Watching(DirectExchange):
     """Keeps the time and the stamps of robot 0 at every sample."""
 
@@ -300,43 +277,6 @@ def test_sensors_of_a_wrong_clock_measure_at_other_instants_and_their_stamps_say
     shift = -pose[0]
     assert 0.0 < abs(shift) <= 0.004
     np.testing.assert_allclose(pose, np.maximum(time - 0.02, 0.0) - shift, atol=1e-12)
-
-
-USUAL = Deployment(
-    control_rate=200.0,
-    mass_error=0.2,
-    measurements=Measurements(1e-3, 5e-4, 1e-3, delay=0.01, loss=0.1, late=0.1, late_by=0.01),
-    actuators=ActuatorLimits(base_force=300.0, lag=0.005),
-    messages=Messages(loss=0.2, repeat=0.2, delay=0.01),
-)
-SINGLE = Deployment(
-    control_rate=100.0,
-    robots={
-        "robot_0": RobotDepartures(
-            clock_error=0.005, silence=Silence(0.5, 0.02, "held"), odometry_scale=0.01
-        ),
-        "robot_1": RobotDepartures(switch_delay=0.01, deaf=Deafness(0.2, 0.3)),
-    },
-)
-HELD = Control(hold=Hold(at=(0.3,), duration=0.5, silence=0.1, energy=8.0))
-CASES = {
-    "base, sampled": ("base", Deployment(control_rate=100.0), Control()),
-    "elbow, usual departures": ("elbow", USUAL, Control(predictor=True, observer=True)),
-    "three, usual departures, held": ("three", USUAL, HELD),
-    "base, single robots depart, held": ("base", SINGLE, HELD),
-}
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("case", CASES)
-def test_the_log_is_that_of_the_closed_loop(case):
-    team, deployment, control = CASES[case]
-    scenario, plan = small_problem(team)
-    scenario = replace(scenario, deployment=deployment, control=control)
-    together = simulate(scenario, plan, small_maps())
-    apart = simulate_apart(scenario, plan, small_maps())
-    assert together.reached
-    assert differences(together, apart) == []
 
 
 def test_robots_apart_compute_at_common_samples():

@@ -1,22 +1,18 @@
 """Robots and supervisor as processes: runs are those of one process, whatever goes wrong ends at rest."""
 
 import os
-import random
 import signal
 from dataclasses import replace
 from functools import cache
 
-import msgspec
 import numpy as np
 import pytest
-import zmq
 
 from benchmarks.one_process import DirectExchange, simulate_apart
 from coop_drake.apart import LocalTeam, network_of, run_world
 from coop_drake.apart.faults import NO_FAULTS, ChannelFaults, ClockFault, Faults, Gap
-from coop_drake.apart.messages import PROTOCOL, SUPERVISOR, WORLD, Effort, Hello, Ready, Switch, encode
+from coop_drake.apart.messages import SUPERVISOR
 from coop_drake.apart.world import Pacing
-from coop_drake.diagram import build_world
 from coop_drake.errors import MessagingError, RefusalError
 from coop_drake.plant import planning_problem, run_setup
 from coop_drake.scenario import (
@@ -30,7 +26,7 @@ from coop_drake.scenario import (
     RobotDepartures,
     Silence,
 )
-from coop_drake.simulation import communication, run_loop, simulate
+from coop_drake.simulation import communication, simulate
 from coop_drake.verification.runs import verify_log
 from tests.support.motions import motion_under_budget, small_motion
 from tests.support.same_runs import differences
@@ -100,14 +96,21 @@ def test_a_run_is_that_of_one_process_with_as_many_messages_of_the_team():
     assert cells == [*range(1, len(problem[1].cells))]
 
 
+NOISY = {"measurements": Measurements(1e-3, 5e-4, 1e-3, delay=0.01), "messages": Messages(loss=0.2)}
+SINGLE = {
+    "robots": {
+        "robot_0": RobotDepartures(
+            clock_error=0.005, silence=Silence(0.5, 0.02, "held"), odometry_scale=0.01
+        ),
+        "robot_1": RobotDepartures(switch_delay=0.01, deaf=Deafness(0.2, 0.3)),
+    }
+}
+
+
 @pytest.mark.slow
-def test_a_held_team_of_three_with_noise_delay_and_losses_runs_as_in_one_process():
-    problem = sampled(
-        "three",
-        Control(hold=Hold(at=(0.3,), duration=0.3, silence=0.1)),
-        measurements=Measurements(1e-3, 5e-4, 1e-3, delay=0.01),
-        messages=Messages(loss=0.2),
-    )
+@pytest.mark.parametrize(("team", "departures"), [("three", NOISY), ("base", SINGLE)])
+def test_a_held_team_with_departures_runs_as_in_one_process(team, departures):
+    problem = sampled(team, Control(hold=Hold(at=(0.3,), duration=0.3, silence=0.1)), **departures)
     in_one = simulate(*problem, small_maps())
     assert in_one.reached
     assert differences(in_one, run(problem)[0]) == []
@@ -124,162 +127,6 @@ def test_the_pace_of_the_wall_clock_changes_nothing_where_nobody_is_late():
     assert ages["late"] == 0
     assert [process["state"] for process in facts["processes"]] == ["follows the plan"] * 2 + ["there"]
     assert facts["refused"] == {}
-
-
-class OutsideWorld:
-    """A world that knows nothing but docs/reference/messages.md and the fields: bare sockets, lists, maps."""
-
-    def __init__(self, address, robots):
-        self._socket = zmq.Context.instance().socket(zmq.ROUTER)
-        self._socket.linger = 10_000
-        self._socket.bind(address)
-        self._robots, self._routes, self._numbers = robots, {}, {}
-        self._counts, self._sample, self._efforts = {}, 0, {}
-        while len(self._routes) <= robots:
-            self._hear()
-
-    def _send(self, index, fields, number=0):
-        route, session = self._routes[index]
-        self._socket.send_multipart([route, msgspec.msgpack.encode([session, number, fields])])
-
-    def _hear(self):
-        """Take in a message, with the name of its type and its sender."""
-        assert self._socket.poll(10_000)
-        route, data = self._socket.recv_multipart()
-        session, _, fields = msgspec.msgpack.decode(data)
-        if fields["type"] == "Hello":
-            assert fields["protocol"] == PROTOCOL
-            self._routes[fields["sender"]], self._numbers[fields["sender"]] = (route, session), 0
-            self._send(fields["sender"], {"type": "Welcome"})
-            return None, fields
-        return next(k for k, known in self._routes.items() if known[0] == route), fields
-
-    def _told(self, place):
-        everyone, nothing = (*range(self._robots), SUPERVISOR), [0] * (1 + self._robots)
-        return [self._counts.get(k, nothing)[place] for k in everyone]
-
-    def _ask(self, time, measured, stamps, step):
-        for k in (*range(self._robots), SUPERVISOR):
-            fields = {"number": self._sample, "time": time, "step": step, "stopped": False}
-            if k == SUPERVISOR:
-                fields |= {"type": "Tick", "team_messages": self._told(-1)[:-1]}
-            else:
-                own, (pose, state) = measured[k].tolist(), stamps[k].tolist()
-                fields |= {"type": "Sample", "team_messages": self._told(k)}
-                fields |= {"pose_stamp": pose, "state_stamp": state}
-                fields |= {"object_pose": own[-3:], "robot_state": own[:-3]}
-            unfitting = [fields | {"time": "now"}, fields | {"team_messages": [0] * 7}, {"type": "Stop"}]
-            unfitting += [fields | {"number": 9999}] if k != SUPERVISOR and self._sample == 1 else []
-            for wrong in unfitting if self._sample in (0, 1) and step else []:
-                self._send(k, wrong, self._numbers[k] + 1)
-            self._numbers[k] += 2
-            self._send(k, fields, self._numbers[k])
-        shown = {}
-        while len(shown) <= self._robots:
-            sender, fields = self._hear()
-            if fields["type"] == "Effort":
-                self._efforts[sender] = np.array(fields["efforts"])
-            elif fields["type"] != "Hello":
-                shown[sender] = fields
-        self._counts = {k: fields["team_messages"] for k, fields in shown.items()}
-        status = shown.pop(SUPERVISOR)
-        self.refused = [status["refused"], *(fields["refused"] for fields in shown.values())]
-        ends = [status["cell"], status["entry"], status["arrived"], *status["causes"]]
-        return np.concatenate([*(shown[k]["values"] for k in range(self._robots)), ends])
-
-    def look(self, time, measured, stamps=None):
-        stamps = [np.full(2, time)] * self._robots if stamps is None else stamps
-        if time != self._sample * 0.01:
-            return self._ask(time, measured, stamps, step=False)
-        self._shown = self._ask(time, measured, stamps, step=True)
-        return self._shown
-
-    def step(self, time, measured, stamps=None):
-        self._sample += 1
-        return [self._efforts[k] for k in range(self._robots)]
-
-    def trouble(self):
-        return ""
-
-    def stopped(self):
-        return False
-
-    def close(self):
-        for k in self._routes:
-            self._send(k, {"type": "Goodbye", "outcome": 0})
-        self._socket.close()
-
-
-@pytest.mark.slow
-def test_a_world_that_is_built_by_the_page_of_messages_runs_the_team_as_ours_does(capfd):
-    problem = sampled("base")
-    network = network_of(*problem)
-    with LocalTeam(*problem, small_maps(), network) as team:
-        outside = OutsideWorld(network.book.world.address, 2)
-        world = build_world(*problem, outside)
-        try:
-            log = run_loop(world, problem[0])
-        finally:
-            outside.close()
-            world.release()
-        for process in team.processes.values():
-            process.join(5.0)
-        assert [process.exitcode for process in team.processes.values()] == [0, 0, 0]
-    assert outside.refused == [6, 7, 7]
-    assert capfd.readouterr().err.count("robot 0 refused a message, and goes on: Expected") == 2
-    assert log.reached
-    assert differences(log, together()) == []
-
-
-class Hostile:
-    """Sends to every port of a team what it must refuse."""
-
-    def __init__(self, book):
-        self._context, self._dice, self._sockets = zmq.Context(), random.Random(1), []
-        for address in (book.world.address, book.supervisor.address):
-            for kind in (zmq.DEALER, zmq.REQ, zmq.PUSH):
-                socket = self._context.socket(kind)
-                socket.linger = 0
-                socket.connect(address)
-                self._sockets.append(socket)
-
-    def act(self, sample):
-        """Send twenty messages of all kinds on each connection that takes them."""
-        session, number = self._dice.getrandbits(32), sample + 2
-        forged = [
-            encode(session, number, Effort(sample, 0.01 * sample, (0, 0, 9), 0, (1e6,) * 5, ())),
-            encode(session, number, Ready(0, ready=True)),
-            encode(session, number, Switch(1, sample)),
-            encode(session, 0, Hello(PROTOCOL, 0, "", "")),
-            encode(session, 0, Hello(PROTOCOL, WORLD, "", "")),
-            encode(session, 0, Hello(PROTOCOL - 1, 1, "", "")),
-        ]
-        noise = [self._dice.randbytes(self._dice.randrange(200)) for _ in range(14)]
-        for socket in self._sockets:
-            for data in forged + noise:
-                try:
-                    socket.send(data, zmq.NOBLOCK)
-                except zmq.ZMQError:  # It is full, or waits for an answer that never comes.
-                    break
-
-    def close(self):
-        for socket in self._sockets:
-            socket.close()
-        self._context.term()
-
-
-@pytest.mark.slow
-def test_the_log_beside_one_who_floods_forges_and_sends_random_bytes_is_that_of_an_undisturbed_run():
-    problem = sampled("base")
-    network = network_of(*problem)
-    hostile = Hostile(network.book)
-    try:
-        with LocalTeam(*problem, small_maps(), network) as team:
-            log = run_world(*problem, network, processes=team, before=hostile.act)
-    finally:
-        hostile.close()
-    assert log.reached
-    assert differences(together(), log) == []
 
 
 @pytest.mark.slow
@@ -357,14 +204,6 @@ def test_a_supervisor_that_is_killed_and_started_again_learns_the_cell_and_nothi
     assert facts["stops"] == []
     assert min(log.funnel_margin.min(), log.slice_margin.min(), log.cell_clearance.min()) > 0.0
     assert set(log.cell_index) == set(together().cell_index)
-
-
-@pytest.mark.slow
-def test_a_robot_and_the_supervisor_that_are_killed_together_rejoin():
-    log, facts, _ = run(sampled("three"), {FAULT: kill(2, SUPERVISOR)})
-    assert log.reached
-    assert nothing_touched(log, 0.05)
-    assert facts["restarts"] == {"robot 2": 1, "the supervisor": 1}
 
 
 @pytest.mark.slow

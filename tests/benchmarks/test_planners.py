@@ -3,17 +3,13 @@
 import numpy as np
 import pytest
 
-from benchmarks.isolated import Isolated
-from benchmarks.planner import contradiction
 from benchmarks.planner.cases import CASES
-from benchmarks.planner.contradiction import Patience, contradiction_rows
 from benchmarks.planner.critical_width import Corridor, critical_interval
 from benchmarks.planner.family import (
     corridor_problem,
     first_question,
 )
 from benchmarks.planner.head_to_head import judged
-from benchmarks.planner.ours import Planned, plan_repeatedly
 from benchmarks.planner.stages import STAGES, without_stage
 from benchmarks.questions.peers import PeerRun, fault_of, run_ompl, run_trees
 from benchmarks.smooth import limited_scenario
@@ -120,23 +116,3 @@ def test_bounds_meet_at_the_critical_width_and_undecided_ones_keep_them_apart():
     assert 0.74 < found.way <= 0.741
     assert all(0.72 <= width <= 0.74 for width in found.undecided)
     assert len(found.seconds) < 20
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("answer", "contradictions"), [("infeasible", 1), ("undecided", 0)])
-def test_only_paths_that_hold_contradict_and_only_a_no(monkeypatch, answer, contradictions):
-    ours = Planned(answer, 1.0, 1.0, 1, 1, 0.0, 0.0)
-    wrong = np.array([EASY.start, [9.0, 9.0, 0.0, 0.0, 0.0]])
-    peers = (PeerRun(1, 2.0, HONEST, 10), PeerRun(2, 3.0, wrong, 20))
-
-    def faked(work, *arguments, limit):
-        return Isolated((ours,) if work is plan_repeatedly else peers, 1.0, None)
-
-    monkeypatch.setattr(contradiction, "in_own_process", faked)
-    monkeypatch.setattr(contradiction, "has_ompl", lambda: False)
-    found = contradiction_rows("planner/no_way/easy", EASY, Patience())
-    rows = {row.figure: (row.value, row.unit) for row in found}
-    assert rows["answer"] == (float(answer == "infeasible"), answer)
-    assert rows["contradictions"] == (contradictions, "paths in 2 runs, 5 CPU s")
-    assert rows["paths_found"] == (1, "paths")
-    assert rows["checks"] == (30, "checks")

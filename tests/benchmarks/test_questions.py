@@ -7,7 +7,6 @@ from math import isnan, nan
 import numpy as np
 import pytest
 import shapely
-from shapely import box
 from typer.testing import CliRunner
 
 from benchmarks.app import app
@@ -20,8 +19,8 @@ from benchmarks.questions.answering import (
     ask,
     sampled_margin,
 )
-from benchmarks.questions.peers import Searched, fault_of, search_by_peers
-from benchmarks.questions.question import narrowest_corridor, random_question
+from benchmarks.questions.peers import Searched, fault_of
+from benchmarks.questions.question import random_question
 from benchmarks.questions.settings import QuestionSettings
 from benchmarks.questions.summary import summarise_questions
 from benchmarks.questions.teams import SHAPES
@@ -35,8 +34,6 @@ from coop_drake.planning.planner import plan
 from coop_drake.plant import planning_problem
 from coop_drake.plant.problem import collisions
 from coop_drake.scenario import load_scenario
-from coop_drake.tree.component_tree import Body, Component, ComponentTree
-from tests.support.cases import rectangle
 
 SMALL = QuestionSettings(seeds=(3,), robots=(2,), most_joints=1, floors=("room",), peer_time=0.0)
 RIGHT = QuestionRecord(0, 3, "room", 2, 2, "bar", "plan", 1.5, verified=True, sampled_margin=1e-6)
@@ -71,13 +68,6 @@ def test_a_question_is_an_ordinary_scenario_that_begins_and_ends_without_collisi
     assert question.kind.split(",")[0] in SHAPES
 
 
-def test_the_narrowest_corridor_of_a_bar_is_as_wide_as_the_bar():
-    bar = Component("bar", None, None, (Body("bar", None, (rectangle(-1.0, 1.0, -0.2, 0.2),)),))
-    width = narrowest_corridor(ComponentTree((bar,), frozenset()), np.random.default_rng(1))
-    assert width == pytest.approx(0.4, abs=1e-3)
-    assert width >= 0.4
-
-
 @pytest.fixture(scope="module")
 def planned(question):
     """The answer that the planner gives, once for all tests."""
@@ -98,17 +88,6 @@ def test_sampled_cells_keep_bodies_apart_and_forged_ones_do_not(question, planne
         tuple(replace(cell, upper=cell.upper + 0.5) for cell in plan.cells),
     ):
         assert sampled_margin(problem, replace(plan, cells=cells), 40 if len(cells) > 1 else 1, 1) <= 0.0
-
-
-def test_other_planners_find_an_easy_path_and_none_through_a_wall(question):
-    found = search_by_peers(replace(question.problem, workspace=box(-50.0, -50.0, 50.0, 50.0)), 5.0, 1)
-    assert found.planners == ("trees",)
-    assert found.path is not None
-    x, y = question.problem.start[:2]
-    island = box(x - 2.0, y - 2.0, x + 2.0, y + 2.0)
-    closed = replace(question.problem, workspace=island, goal_pose=np.array([x + 9.0, y, 0.0]))
-    nothing = search_by_peers(closed, 0.1, 1)
-    assert (nothing.path, nothing.planners[0]) == (None, "trees")
 
 
 @pytest.fixture

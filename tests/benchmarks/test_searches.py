@@ -15,8 +15,6 @@ from benchmarks.searches.departures import BoundedDepartures, departures_at, lar
 from benchmarks.searches.findings import (
     BreakingPoint,
     Finding,
-    ends_shown,
-    multiple_shown,
     summarise_searches,
 )
 from benchmarks.searches.searching import Searching, first_lost, search_worst
@@ -264,31 +262,6 @@ def test_every_campaign_of_the_folder_is_made_and_can_be_read_and_no_other(capsy
         campaigns.main(["runs"])
     assert ended.value.exit_code == 2
     assert "allowed is any of breaking, searches" in capsys.readouterr().err
-
-
-def point(scenario="base", departure="lag", certified=0.1, kept=4.0, lost=4.5):
-    return BreakingPoint(scenario, "drake", departure, certified, kept, lost, 5, "left")
-
-
-def test_bisections_tell_the_least_multiple_and_a_loss_inside_what_is_certified():
-    good, inside = point(), point("tight", "all", 1.0, 0.5, 0.625)
-    unknown = point(departure="model_error", certified=nan, kept=0.0, lost=inf)  # its process was lost
-    for points, said, fine in (
-        ([good], "", True),
-        ([good, inside], "A run was lost at 0.62 times what is certified (all, tight).", False),
-        (
-            [good, point(departure="all", kept=2.0)],
-            "No run was lost up to 2 times what is certified (all, base).",
-            True,
-        ),
-        ([point(lost=inf), unknown], "1 breaking point is not determined (model error, base).", False),
-        ([unknown], "1 breaking point is not determined (model error, base).", False),
-    ):
-        results = Results(points=tuple(points))
-        assert results.good == fine
-        assert results.headline == said or not said
-    assert {*ends_shown(unknown), multiple_shown(unknown)} == {"not determined"}
-    assert multiple_shown(point(lost=inf)) == "4 or more"
 
 
 def find(seed, before, worst, arrived=True, reason="", margin="funnel_margin", runs=10):

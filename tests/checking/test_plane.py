@@ -2,7 +2,7 @@
 
 from fractions import Fraction
 from itertools import pairwise
-from math import cos, hypot, isqrt, sin
+from math import cos, isqrt, sin
 
 import pytest
 from hypothesis import assume, given, settings
@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from shapely import LineString, MultiPoint, Point, Polygon
 
 from coop_drake.checking import RefusedError, check, plane, regions, team
-from coop_drake.checking.infeasible import WIDENING, _check_cover, _chosen, _inside, _Sets, _squeezed
+from coop_drake.checking.infeasible import WIDENING, _check_cover, _inside, _squeezed
 from coop_drake.checking.plane import (
     BITS,
     ONE,
@@ -162,12 +162,6 @@ def test_regions_touch_if_they_share_a_point(first, second):
         assert one.touches(other) == polygons[0].intersects(polygons[1]) == other.touches(one)
 
 
-def test_a_point_beside_a_slanted_edge_lies_inside_though_it_is_in_the_edges_box():
-    slanted = region([(0, 0), (9, 0), (9, 9)])
-    assert slanted.stretches(((6, 2), (6, 2))) == [(0, FULL)]
-    assert slanted.stretches(((2, 2), (2, 2))) == slanted.stretches(((2, 3), (2, 3))) == []
-
-
 @given(
     st.lists(st.tuples(st.integers(20, 60), st.integers(-9, 9)), min_size=60, max_size=90),
     st.tuples(st.integers(-50, 50), st.integers(-60, 60), st.integers(0, 30), st.integers(0, 30)),
@@ -225,21 +219,6 @@ def test_walls_forbid_positions_by_each_of_two_witnesses(half, covered):
     else:
         with pytest.raises(RefusedError, match="no cell covers"):
             _check_cover([], [], witnesses, floor, "slices[0]")
-
-
-SHARE = st.integers(-1, 9).map(lambda k: k * FULL // 8)
-
-
-@given(st.lists(st.tuples(SHARE, SHARE, st.integers(0, 5)), max_size=8))
-def test_stretches_are_chosen_that_reach_furthest(stretches):
-    expected, covered = set(), -1
-    while covered < FULL:
-        high, k = max([(high, -k) for low, high, k in stretches if low <= max(covered, 0)], default=(-1, 0))
-        if high <= covered:
-            expected = set()
-            break
-        expected, covered = expected | {-k}, high
-    assert _chosen(stretches) == expected
 
 
 # What the exact checker constructs encloses, compared with rational arithmetic, in units of 2^-80 m.
@@ -387,14 +366,6 @@ def test_what_moves_stays_in_its_enclosure_though_it_is_a_few_units_large(
             x, y = x + step.offset[0], y + step.offset[1]
         away = float(square_distance((Fraction(x), Fraction(y)), found)) ** 0.5
         assert away + 1 <= grown + 1e-9
-
-
-@given(RINGS)
-def test_the_mean_of_a_witness_is_less_than_two_units_off(corners):
-    polygon = hull(corners)
-    (_, (x, y)) = _Sets([], [polygon], Region([[(0, 0), (9, 0), (9, 9)]], odd=False)).known[0]
-    mean = [sum(values) / len(polygon) for values in zip(*polygon, strict=True)]
-    assert hypot(x + mean[0], y + mean[1]) < 2
 
 
 def test_repeated_corners_make_no_edges_and_a_point_makes_one():

@@ -214,14 +214,6 @@ def test_the_compiled_loop_judges_every_joint_at_the_goal():
     assert "max_time" in outcome.reason
 
 
-def test_a_thousand_samples_a_second_are_survived_too():
-    scenario, plan = small_problem("base")
-    fast = replace(scenario, deployment=Deployment(control_rate=1000.0))
-    outcome = compiled_run(prepare(fast, plan, small_maps()))
-    assert outcome.arrived, outcome.reason
-    assert min(outcome.funnel_margin, outcome.cell_margin) > 0.0
-
-
 @pytest.mark.parametrize(("seed", "mass_error"), [(0, 0.2), (1, -0.2), (2, 0.2)])
 def test_a_team_as_the_preset_describes_it_arrives(seed, mass_error):
     preset = convert_class({"preset": "mobile_base", "mass_error": mass_error, "seed": seed}, Deployment)
@@ -271,14 +263,6 @@ def test_a_fast_rate_comes_close_to_continuous_time():
         errors.append(np.abs(np.transpose(poses) - ideal.object_pose).max())
     assert errors[1] < 0.5 * errors[0]
     assert errors[1] < 0.005
-
-
-def test_a_seed_makes_a_run_again_to_the_last_bit():
-    deployment = sampled(RATE, measurements=Measurements(1e-3, 1e-3, 1e-3), seed=4)
-    first, other = run(deployment, max_time=0.3), run(replace(deployment, seed=5), max_time=0.3)
-    again = run_anew(deployment, max_time=0.3)
-    np.testing.assert_array_equal(first.object_pose, again.object_pose)
-    assert np.any(first.object_pose != other.object_pose)
 
 
 SECONDS = 6.0

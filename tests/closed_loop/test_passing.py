@@ -91,11 +91,6 @@ def test_forces_of_bases_are_what_accelerates_all_that_they_move(transport: Tran
     assert (found["force_of"], found["force_by"]) == ("robot_0", "base_force")
 
 
-def test_a_team_that_passes_needs_no_maps(transport: Transport) -> None:
-    _, _, plan, _ = transport
-    assert build_maps(plan) == ()  # with which the transport was simulated
-
-
 def test_it_never_stops_between_start_and_goal(transport: Transport) -> None:
     _, _, plan, log = transport
     speed = np.hypot(log.object_twist[:, 0], log.object_twist[:, 1])

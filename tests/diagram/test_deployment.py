@@ -17,7 +17,6 @@ from coop_drake.scenario import (
     Floor,
     JointFriction,
     Measurements,
-    Messages,
     PlantSettings,
     PoseBias,
     Push,
@@ -31,7 +30,6 @@ from coop_drake.scenario.checks import validate
 from coop_drake.simulation import configure_simulator
 from tests.support.small_loop import small_maps, small_problem
 from tests.support.small_scenario import small_scenario
-from tests.support.system_checks import port_sizes
 
 NOISE = Measurements(position_noise=0.01, angle_noise=0.02, rate_noise=0.03)
 
@@ -62,43 +60,6 @@ def test_an_ideal_team_has_nothing_round_its_controllers():
     loop = loop_of(seed=3)
     assert loop.deployed == ()
     assert loop.bare_controllers == loop.controllers
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("deployment", "more"),
-    [
-        ({"mass_error": 0.1}, set()),
-        ({"actuators": ActuatorLimits(base_force=50.0)}, set()),
-        ({"control_rate": 200.0}, {"effort_hold", "radio"}),
-        (
-            {"control_rate": 200.0, "measurements": NOISE},
-            {"effort_hold", "radio", "object_pose_measured", "robot_state_measured"},
-        ),
-        (
-            {"control_rate": 200.0, "measurements": Measurements(waves=Waves(joints=Wave(0.001)))},
-            {"effort_hold", "radio", "robot_state_measured"},
-        ),
-        (
-            {"control_rate": 200.0, "measurements": Measurements(delay=0.01)},
-            {"effort_hold", "radio", "object_pose_delay", "robot_state_delay"},
-        ),
-        (
-            {"actuators": ActuatorLimits(lag=0.01)},
-            {"effort_in_kilonewtons", "actuator_lag", "lagged_effort"},
-        ),
-        (
-            {"control_rate": 200.0, "actuators": ActuatorLimits(lag=0.01)},
-            {"effort_hold", "radio", "actuator_lag"},
-        ),
-    ],
-)
-def test_only_what_is_switched_on_is_there_beside_a_limit(deployment, more):
-    loop = loop_of(**deployment)
-    for deployed, controller in zip(loop.deployed, loop.controllers, strict=True):
-        assert deployed.diagram is controller
-        assert parts(controller) == {"controller", "actuator_limits"} | more
-        assert port_sizes(controller) == port_sizes(deployed.controller)
 
 
 def test_a_sampled_team_keeps_its_governors_between_samples():
@@ -156,19 +117,6 @@ def test_positions_angles_and_rates_have_deviations_of_their_own():
             context.SetTime(period / 200.0)
             found.append(noise.get_output_port().Eval(context))
         np.testing.assert_allclose(np.std(found, axis=0), expected, rtol=0.15)
-
-
-def test_actuators_give_no_more_than_their_limits():
-    loop = loop_of(actuators=ActuatorLimits(base_force=0.5, base_torque=0.25, joint_effort=0.125))
-    simulator = Simulator(loop.diagram, loop.create_context())
-    simulator.AdvanceTo(0.2)
-    root = simulator.get_context()
-    both = (outputs(parts, root, "robot_effort") for parts in (loop.controllers, loop.bare_controllers))
-    for given, wanted in zip(*both, strict=True):
-        assert np.hypot(*given[:2]) <= 0.5 * (1.0 + 1e-12)
-        np.testing.assert_allclose(given[:2], wanted[:2] * min(1.0, 0.5 / np.hypot(*wanted[:2])), rtol=1e-12)
-        np.testing.assert_array_equal(given[2:], np.clip(wanted[2:], [-0.25, -0.125], [0.25, 0.125]))
-        assert np.any(given != wanted)
 
 
 def test_where_no_limit_is_given_the_limit_lets_every_effort_pass_but_those_of_a_lost_run():
@@ -236,15 +184,6 @@ def test_robots_that_overestimate_masses_push_harder():
         efforts.append(outputs(loop.bare_controllers, root, "robot_effort"))
     np.testing.assert_allclose(efforts[1], 1.5 * np.array(efforts[0]), rtol=1e-9, atol=1e-9)
     assert np.abs(efforts[0]).max() > 0.1
-
-
-def test_between_robots_only_reports_cross_in_a_deployment_too():
-    loop = loop_of(control_rate=100.0, measurements=NOISE, messages=Messages(0.1, 0.1, 0.02))
-    for (sink, entry), (source, output) in loop.diagram.connection_map().items():
-        ends = (source.get_name(), sink.get_name())
-        if "transport_station" not in ends:
-            port = source.get_output_port(output).get_name(), sink.get_input_port(entry).get_name()
-            assert port[0] in ("ready", "current_cell"), (ends, port)
 
 
 PERIOD = 0.01
@@ -344,13 +283,6 @@ def test_a_push_moves_the_body_for_its_time(body):
         assert moved[1, 0] >= 3.0 / mass
     np.testing.assert_allclose(moved[2], moved[1] + moved[3], atol=1e-9)
     assert np.all(np.abs(moved[[1, 3]]).max(axis=1) > 1e-2)
-
-
-def test_friction_brakes_a_moving_team():
-    scenario = replace(small_scenario("base"), deployment=Deployment(floor=Floor(20.0, 1.0)))
-    moving = np.array([0.5, 0.0, 0.0, 0.0, 0.0])
-    assert object_acceleration(scenario, rates=moving)[0] == pytest.approx(-2 * 20.5 / 17.0, rel=0.2)
-    np.testing.assert_array_equal(object_acceleration(scenario), 0.0)
 
 
 def test_friction_of_joints_holds_them_at_rest_against_less_and_not_against_more():

@@ -5,7 +5,7 @@ import pytest
 import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from shapely import LineString, Point, Polygon, box
+from shapely import Point, Polygon, box
 
 from coop_drake.errors import GeometryError
 from coop_drake.geometry import (
@@ -42,14 +42,6 @@ def test_signed_distance_equals_that_of_shapely(floor, seed):
     np.testing.assert_array_equal([distance(point) for point in points], distance.batch(points))
 
 
-@pytest.mark.parametrize(
-    ("point", "expected"),
-    [((0.5, 1.5), 0.5), ((1.5, 1.5), -0.5), ((-3.0, -4.0), -5.0), ((1.0, 1.5), 0.0), ((4.0, 3.0), 0.0)],
-)
-def test_distance_in_a_room_with_a_pillar(point, expected):
-    assert BoundaryDistance(ROOM_WITH_PILLAR)(np.array(point)) == pytest.approx(expected, abs=1e-15)
-
-
 def test_points_level_with_vertices_are_judged_like_the_others():
     diamond = Polygon([(0, -1), (1, 0), (0, 1), (-1, 0)])
     distance = BoundaryDistance(diamond)
@@ -66,11 +58,6 @@ def test_clearance_along_a_segment_equals_that_of_shapely(floor, seed):
     distance = BoundaryDistance(floor)
     expected = [floor.boundary.distance(shapely.LineString(pair)) for pair in ends]
     np.testing.assert_allclose(distance.along(ends[:, 0], ends[:, 1]), expected, atol=1e-13)
-
-
-def test_a_segment_that_is_a_point_has_the_clearance_of_the_point():
-    point = np.array([[0.5, 1.5]])
-    assert BoundaryDistance(ROOM_WITH_PILLAR).along(point, point) == pytest.approx(0.5)
 
 
 def test_segments_need_as_many_starts_as_ends():
@@ -107,12 +94,6 @@ def test_the_wider_of_two_aisles_is_taken_though_it_is_longer():
     passage = PassageFinder(rooms_joined_by((0.4, 0.6), (1.5, 1.9))).find((0.5, 0.5), (4.5, 0.5))
     assert passage.clearance == pytest.approx(0.2, rel=0.02)
     assert passage.length > 4.3
-
-
-def test_a_clear_straight_way_is_taken_as_it_is():
-    passage = PassageFinder(box(0, 0, 4, 2)).find((1.0, 1.0), (3.0, 0.5))
-    assert passage.path.equals(LineString([(1.0, 1.0), (3.0, 0.5)]))
-    assert passage.clearance == pytest.approx(0.5)
 
 
 def test_a_passage_from_a_point_to_itself_has_no_length():
@@ -187,11 +168,6 @@ def test_nothing_is_gained_and_no_more_than_the_tolerance_is_lost(floor, toleran
     assert depth.max() <= tolerance + 1e-9
 
 
-def test_idle_vertices_on_straight_walls_go():
-    room = shapely.segmentize(box(0, 0, 3, 2), 0.01)
-    assert vertices(simplify_inward(room, 1e-6, slack=1e-9)) == 4
-
-
 def test_a_round_pillar_becomes_a_polygon_around_it():
     pillar = Point(1, 1).buffer(0.3)
     room = box(0, 0, 2, 2).difference(pillar)
@@ -259,12 +235,6 @@ def test_a_tidy_cell_is_inside_whole_and_joins_the_ends(floor_with_ends):
     for end in ends:
         assert BoundaryDistance(tidied)(end) > 0.0
     assert PassageFinder(tidied).find(*ends).clearance >= 0.79 * PassageFinder(safe).find(*ends).clearance
-
-
-def test_a_clean_convex_room_is_kept_but_for_the_guard():
-    tidied = tidy_cell(box(0, 0, 4, 3), [np.array([1.0, 1.0]), np.array([3.0, 2.0])])
-    assert tidied.area == pytest.approx(12.0, rel=1e-5)
-    assert len(edge_lengths(tidied)) == 4
 
 
 def test_a_region_whose_grown_boundary_crosses_itself_is_tidied():

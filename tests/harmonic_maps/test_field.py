@@ -6,7 +6,6 @@ import shapely
 from matplotlib.collections import LineCollection
 from shapely import Point, box
 
-from coop_drake.drawing import save_figure
 from coop_drake.errors import FieldError
 from coop_drake.harmonic_maps import HarmonicMap, VelocityField, trace_streamlines
 from coop_drake.harmonic_maps.field import direction_error
@@ -259,12 +258,6 @@ def test_the_residual_stays_under_the_drawn_bound(picture_map):
     assert bound[0] == picture_map.accuracy.error_estimate
     assert outer.max() <= bound[0]
     assert hole.max() <= 2.0 * bound[0]
-
-
-def test_the_same_map_gives_the_same_picture(picture_map, tmp_path):
-    for name in ("a.png", "b.png"):
-        save_figure(grid_figure(picture_map, lines=6), tmp_path / name, dpi=50)
-    assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
 
 
 HALL = box(0, 0, 6, 4).difference(box(2, 1, 3, 3))

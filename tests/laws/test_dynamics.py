@@ -9,23 +9,20 @@ from hypothesis import strategies as st
 from pydrake.systems.framework import DiagramBuilder
 
 from coop_drake.diagram import brakes_of
-from coop_drake.laws import acceleration_at, actuators, total_wrench, wrench_share
+from coop_drake.laws import acceleration_at, actuators, total_wrench
 from coop_drake.laws.axis_table import DECAY_RATE, FADING_TIME, LAW_COLUMNS, RAMP_RATE, bounds_of
 from coop_drake.laws.motion import place_on_axes
 from coop_drake.laws.robot_dynamics import (
     end_effector_command,
     motion_room,
     read_robot,
-    robot_effort,
 )
 from coop_drake.plant import base_chain, build_team_plant
 from coop_drake.plant.team import base_inertia
 from coop_drake.scenario import ActuatorLimits, load_scenario
 from tests.support.planar_arm import random_arm, random_state
-from tests.support.robot_matrices import grasp_matrix, robot_acceleration, turned
+from tests.support.robot_matrices import grasp_matrix, turned
 from tests.support.small_scenario import small_scenario
-
-coordinates = st.floats(-1.0, 1.0)
 
 
 def test_the_base_of_every_robot_turns_with_the_object_and_against_its_joints():
@@ -169,59 +166,6 @@ def test_the_closed_form_of_the_arm_satisfies_the_equations_of_motion(joints):
     assert jacobian.shape == (3, 3 + joints)
 
 
-@pytest.mark.parametrize("joints", [(1, 1), (2, 1, 3), (1, 0, 2, 1, 2)])
-def test_the_team_moves_the_object_as_commanded_and_loads_every_grasp_by_its_share(joints):
-    """Solve the team's constrained dynamics, (2) and (27), and find what every robot meant to happen."""
-    rng = np.random.default_rng(sum(joints))
-    mass, inertia, com_offset = 1.7, 0.6, np.array([0.05, -0.12])
-    wanted, rate = rng.normal(size=3), 1.3
-    robots, columns = len(joints), 3
-    sizes = [3 + n for n in joints]
-    unknowns = 3 + sum(sizes) + 3 * robots
-    system, right = np.zeros((unknowns, unknowns)), np.zeros(unknowns)
-    # Object: M a_com = sum of the wrenches, torques about the centre of mass.
-    body = np.diag([mass, mass, inertia])
-    system[:3, :3] = body @ grasp_matrix(com_offset)
-    right[:3] = body @ np.array([*(rate**2 * com_offset), 0.0])
-    row, wrench_at = 3, 3 + sum(sizes)
-    shares = rng.dirichlet(np.ones(robots))
-    commanded = []
-    for k, n in enumerate(joints):
-        arm = random_arm(rng, n)
-        z, v = random_state(rng, n)
-        offset = rng.uniform(-0.5, 0.5, 2)
-        # The grasp is rigid, so the base moves such that J z' is the twist of the grasp.
-        _, jacobian, _ = arm.end_effector(z, v)
-        twist = grasp_matrix(offset) @ np.array([0.3, -0.2, rate])
-        v[:3] = np.linalg.solve(jacobian[:, :3], twist - jacobian[:, 3:] @ v[3:])
-        _, jacobian, rate_term = arm.end_effector(z, v)
-        mass_matrix, bias = arm.dynamics(z, v)
-        joint_wanted = rng.normal(size=n)
-        load = np.array([*offset, *com_offset, mass, inertia, shares[k]])
-        command, torque, axes = np.empty(6), np.empty(3 + n), np.array([wanted[2], *joint_wanted])
-        end_effector_command(load, np.array([0.0, 0.0, 0.0, 0.0, 0.0, rate]), wanted[:2], axes, command)
-        robot_effort(arm.chain(), motion_room(arm.chain()), np.concatenate([z, v]), command, axes, torque)
-        z_wanted = robot_acceleration(
-            command[:3], joint_wanted, jacobian=jacobian, jacobian_rate_term=rate_term
-        )
-        commanded.append((z_wanted, command[3:]))
-        z_slice, w_slice = slice(columns, columns + 3 + n), slice(wrench_at + 3 * k, wrench_at + 3 * k + 3)
-        system[:3, w_slice] = -grasp_matrix(offset - com_offset).T
-        system[row : row + 3 + n, z_slice] = mass_matrix
-        system[row : row + 3 + n, w_slice] = jacobian.T
-        right[row : row + 3 + n] = torque - bias
-        row += 3 + n
-        system[row : row + 3, z_slice] = jacobian
-        system[row : row + 3, :3] = -grasp_matrix(offset)
-        right[row : row + 3] = np.array([*(-(rate**2) * offset), 0.0]) - rate_term
-        row += 3
-        columns += 3 + n
-    solution = np.linalg.solve(system, right)
-    assert solution[:3] == pytest.approx(wanted, abs=1e-9)
-    expected = np.concatenate([z for z, _ in commanded] + [share for _, share in commanded])
-    assert solution[3:] == pytest.approx(expected, abs=1e-9)
-
-
 OFFSET = np.array([0.4, -0.1])
 
 
@@ -234,17 +178,6 @@ def test_acceleration_at_a_point_is_the_second_derivative_of_its_path():
     h = 1e-4
     numeric = (path(h) - 2.0 * path(0.0) + path(-h)) / h**2
     assert acceleration_at(*OFFSET, *acceleration, alpha, rate) == pytest.approx(numeric, abs=1e-6)
-
-
-def test_an_object_spinning_about_its_origin_needs_a_force_when_its_mass_is_elsewhere():
-    com_offset = np.array([0.1, 0.0])
-    of_com = acceleration_at(*com_offset, 0.0, 0.0, 0.0, 2.0)
-    assert wrench_share(*com_offset, *of_com, 0.0, 3.0, 1.0, 0.5) == pytest.approx([-0.6, 0.0, 0.0])
-
-
-def test_a_force_beside_the_centre_of_mass_turns_the_object():
-    wrench = total_wrench(np.array([[0.0, 2.0, 0.5]]), np.array([[0.5, 0.0]]), np.array([0.1, 0.0]), 0.0)
-    assert wrench == pytest.approx([0.0, 2.0, 1.3])
 
 
 def test_a_wrench_turns_with_the_object():

@@ -6,19 +6,14 @@ import pytest
 from coop_drake.answers.budget import Budget
 from coop_drake.laws import measurements
 from coop_drake.laws.robot_dynamics import (
-    VX,
-    VY,
     base_acceleration,
     end_effector_command,
     estimate_object,
     motion_room,
-    robot_effort,
-    write_motion,
 )
 from coop_drake.robustness.tracking import gain_sums
 from coop_drake.scenario import Deployment, Measurements
 from tests.support.planar_arm import random_arm, random_state
-from tests.support.robot_matrices import robot_acceleration
 
 
 def wave(number, size, length, phase):
@@ -195,23 +190,6 @@ def test_the_observer_s_loop_is_well_damped_with_the_age_as_a_delay(age):
     assert found.max() <= 1.01 * final
 
 
-@pytest.mark.parametrize("joints", [0, 1, 3])
-def test_the_base_accelerates_as_the_equations_say(joints):
-    rng = np.random.default_rng(joints)
-    arm = random_arm(rng, joints)
-    z, v = random_state(rng, joints)
-    _, jacobian, rate_term = arm.end_effector(z, v)
-    command, axes, effort = rng.normal(size=6), rng.normal(size=1 + joints), np.empty(3 + joints)
-    robot = np.concatenate([z, v])
-    found = base_acceleration(arm.chain(), motion_room(arm.chain()), robot, command, axes)
-    expected = robot_acceleration(command[:3], axes[1:], jacobian=jacobian, jacobian_rate_term=rate_term)
-    np.testing.assert_allclose(found, expected[:3], atol=1e-10)
-    robot_effort(arm.chain(), motion_room(arm.chain()), robot, command, axes, effort)
-    mass_matrix, bias = arm.dynamics(z, v)
-    moved = np.linalg.solve(mass_matrix, effort - bias - jacobian.T @ command[3:])
-    np.testing.assert_allclose(moved[:3], found, atol=1e-9)
-
-
 @pytest.mark.parametrize("joints", [0, 2])
 def test_constant_accelerations_are_predicted_exactly(joints):
     rng = np.random.default_rng(20 + joints)
@@ -228,24 +206,6 @@ def test_constant_accelerations_are_predicted_exactly(joints):
     ):
         np.testing.assert_allclose(found, x + time * rate + 0.5 * time**2 * a, atol=1e-12)
     np.testing.assert_allclose(predicted[n:], v + time * rows[0, 3:], atol=1e-12)
-
-
-def test_every_robot_knows_the_same_object_twist():
-    """(29), from where the base moves so that its hand does what a point of the object does."""
-    rng = np.random.default_rng(7)
-    for _ in range(20):
-        arm, grasp, theta, twist = random_arm(rng, 0), rng.normal(size=2), rng.normal(), rng.normal(size=3)
-        robot, state, motion = (
-            np.array([0.0, 0.0, rng.normal(), 0.0, 0.0, twist[2]]),
-            np.empty(6),
-            motion_room(arm.chain()),
-        )
-        write_motion(arm.chain(), robot, motion)
-        c, s = np.cos(theta), np.sin(theta)
-        offset = np.array([c * grasp[0] - s * grasp[1], s * grasp[0] + c * grasp[1]])
-        robot[3:5] = twist[:2] + twist[2] * np.array([-offset[1], offset[0]]) - motion[-1, [VX, VY]]
-        estimate_object(arm.chain(), grasp, motion, robot, np.array([0.0, 0.0, theta]), state)
-        np.testing.assert_allclose(state[3:], twist, rtol=1e-12, atol=1e-12)
 
 
 def test_what_is_kept_is_what_was_commanded():

@@ -268,17 +268,6 @@ def test_words_of_another_plan_and_of_an_epoch_that_is_over_are_not_heard():
 # The team.
 
 
-def test_nobody_waits_and_all_arrive_in_the_time_of_the_motion_and_one_start():
-    schedule = even_schedule(8)
-    team = Team(schedule, [0.0] * 3)
-    rows = team.until(arrived)
-    moving = schedule.period * (rows[:, 0, 1] > 0.0).sum()
-    assert moving == pytest.approx(schedule.ends[-1], abs=0.01)
-    assert team.time - moving < 3.0 * schedule.window + 0.05
-    assert (team.words[:, :, w.HOLD] == inf).all()
-    assert (rows[:, 0] == rows[:, 1]).all()
-
-
 def test_a_plan_of_one_cell_has_no_brake_phase():
     schedule = w.schedule_of(
         [0.0], [0.0], [], [1.5], ramp=0.1, start_rate=2.0, period=0.005, delay=0.05, clock_error=EPS
@@ -391,32 +380,6 @@ def test_a_robot_whose_monitor_asks_refuses_the_start_and_the_next_one_is_taken_
     assert team.words[0, 0, w.EPOCH] == 2.0
 
 
-def test_a_start_that_one_does_not_hear_is_called_off_by_everybody_without_the_supervisor():
-    schedule = even_schedule(4)
-    team = Team(schedule, [0.0] * 3)
-    team.closed = {(3, 2)}
-    team.until(lambda team: team.words[-1, -1, w.EPOCH] == 1.0)
-    team.step()
-    team.gone = {3}
-    team.until(lambda team: team.kinds[:2] == [w.ARMED] * 2)
-    team.until(all_are(w.REST))
-    assert (team.phases == 0.0).all()
-
-
-def test_a_start_that_is_heard_late_is_refused_since_others_call_it_off():
-    team = Team(even_schedule(4), [0.7] * 3)
-    team.closed = {(3, 2)}
-    team.until(lambda team: team.kinds[:2] == [w.ARMED] * 2)
-    begin = team.motions[0, w.BEGIN]
-    team.until(lambda team: team.time > begin - 1.5 * team.schedule.window)
-    team.closed = set()
-    team.step()
-    team.closed = {(i, j) for i in range(4) for j in range(4) if i != j and 2 in (i, j)}
-    rows = team.until(lambda team: team.time > begin + 1.0)
-    assert team.kinds == [w.REST] * 3
-    assert (rows[:, :, 0] == 0.7).all()
-
-
 def test_no_start_leads_beyond_the_cell_after_the_least_begun():
     """Neither does the supervisor say such a start, nor does a robot take it."""
     schedule = even_schedule(6)
@@ -431,20 +394,6 @@ def test_no_start_leads_beyond_the_cell_after_the_least_begun():
         assert words[1, w.KIND] == (w.ARMED if starts else w.REST)
 
 
-def test_who_has_not_heard_a_start_that_others_have_given_up_leaves_its_epoch_with_them():
-    """Else no supervisor that was started again could ever start them."""
-    team = Team(even_schedule(4), [0.0] * 3)
-    team.closed = {(3, 1), (3, 2)}
-    team.until(lambda team: team.words[-1, -1, w.EPOCH] == 1.0)
-    team.step()
-    team.gone = {3}
-    team.until(lambda team: team.words[0, 0, w.EPOCH] == 1.0 and team.kinds[0] == w.REST)
-    team.words[-1] = w.first_words(team.schedule, 3, again=True)
-    team.past[0, -1] = team.words[-1, -1]
-    team.gone = team.closed = set()
-    team.until(arrived)
-
-
 @pytest.mark.parametrize("late", [0.02, 0.2])
 def test_a_hold_that_is_heard_too_late_is_kept_from_the_last_sample_on(late):
     team = Team(even_schedule(6), [0.0])
@@ -457,38 +406,6 @@ def test_a_hold_that_is_heard_too_late_is_kept_from_the_last_sample_on(late):
     assert abs(pace - before[1]) <= 10.0 * step**2  # rho'' = kappa / r < 20
     assert rate < 0.0
     assert team.kinds == [w.BRAKE]
-
-
-def test_who_does_not_hear_that_a_start_is_called_off_stops_at_once():
-    """Robot 2 hears nothing any more when the monitor of robot 1 asks for a hold, so late as this may be."""
-    schedule = even_schedule(5)
-    team = Team(schedule, [0.7] * 3)
-    team.until(lambda team: team.kinds == [w.ARMED] * 3)
-    begin = team.motions[2, w.BEGIN]
-    team.until(lambda team: team.time > begin - schedule.window - 2.0 * schedule.period)
-    team.closed, team.alarms[1] = {(k, 2) for k in (0, 1, 3)}, w.ASKS
-    team.step()
-    team.alarms[1] = w.THERE
-    team.until(lambda team: team.kinds[2] == w.RUN)
-    team.until(all_are(w.REST))
-    assert team.phases[:2].tolist() == [0.7, 0.7]
-    assert 0.7 < team.phases[2] < 0.71
-    team.closed = set()
-    team.until(arrived)
-
-
-def test_who_never_hears_that_a_cell_is_begun_stops_before_its_end():
-    """Though all words arrive, robot 1 seems not to have begun cell 2."""
-    schedule = even_schedule(6)
-    team, said, braked = Team(schedule, [0.0] * 3), inf, inf
-    while team.kinds[0] != w.REST or team.time < 1.0:
-        team.step()
-        team.past[0, 1, w.CELL] = min(team.past[0, 1, w.CELL], 1.0)
-        said = min(said, team.time) if team.words[0, 0, w.HOLD] < inf else said
-        braked = min(braked, team.time) if team.kinds[0] == w.BRAKE else braked
-    assert team.words[0, 0, w.HOLD] == schedule.brakes[2]
-    assert schedule.ends[1] < team.phases[0] <= schedule.ends[2]
-    assert braked - said == pytest.approx(schedule.window, abs=1.01 * schedule.period)
 
 
 @pytest.mark.parametrize(("age", "fit"), [(WINDOW - 1e-6, 1.0), (WINDOW + 1e-6, 0.0)])
@@ -507,40 +424,6 @@ def test_a_hold_behind_the_start_that_comes_just_after_it_stops_where_the_robot_
     rows = team.until(all_are(w.REST))
     assert (rows[:, :, 0] >= 0.7).all()
     assert (rows[-1, :, 0] < 0.702).all()
-
-
-@pytest.mark.parametrize("kind", [w.REST, w.ARMED, w.RUN, w.BRAKE])
-@pytest.mark.parametrize("one", [0, 3])
-def test_whatever_a_robot_or_the_supervisor_does_when_it_dies_the_others_come_to_rest_together(kind, one):
-    schedule = even_schedule(6)
-    team = Team(schedule, [0.0] * 3)
-    if kind == w.BRAKE:
-        team.until(lambda team: team.time > 1.5)
-        team.wanted = False
-    team.until(all_are(kind))
-    team.gone = {one}
-    others = [k for k in range(3) if k != one]
-    rows = team.until(lambda team: all(team.kinds[k] == w.REST for k in others) and team.time > 2.0)
-    assert np.ptp(rows[:, others, 0], axis=1).max() == 0.0
-    for _ in range(100):
-        team.step()
-    assert all(team.kinds[k] == w.REST for k in others)
-    if one < 3 and kind in (w.ARMED, w.RUN):
-        # Stopped by the words that lack: within a cell of what the dead robot had begun.
-        assert team.phases[others].max() <= schedule.ends[int(team.words[0, 0, w.CELL]) + 1]
-    assert not arrived(team)
-
-
-def test_a_supervisor_that_was_started_again_learns_where_all_are_and_skips_an_epoch():
-    schedule = even_schedule(6)
-    team = Team(schedule, [0.0] * 3)
-    team.until(lambda team: team.time > 1.5)
-    team.words[-1] = w.first_words(schedule, 3, again=True)
-    team.alarms[0] = w.ASKS
-    team.until(all_are(w.REST))
-    team.alarms[0] = w.THERE
-    team.until(arrived)
-    assert team.words[0, 0, w.EPOCH] == 3.0
 
 
 def test_starts_of_a_supervisor_and_of_its_successor_are_not_taken_for_one():
@@ -604,21 +487,6 @@ def test_a_stamp_that_clocks_do_not_allow_asks_for_a_hold(wrong, holds):
     for _ in range(5):
         team.step()
     assert (team.words[0, 0, w.HOLD] < inf) == holds
-
-
-def test_people_hold_the_team_at_a_brake_phase_and_let_it_go_on():
-    schedule = even_schedule(6)
-    team = Team(schedule, [0.0] * 3)
-    team.until(lambda team: team.time > 1.5)
-    team.wanted = False
-    team.until(all_are(w.REST))
-    assert team.words[0, 0, w.HOLD] in schedule.brakes
-    assert np.ptp(team.phases) == 0.0
-    for _ in range(50):
-        team.step()
-    assert team.code == (w.HELD, -1)
-    team.wanted = True
-    team.until(arrived)
 
 
 def test_a_robot_whose_monitor_is_not_quiet_says_no_cell_begun_that_it_enters():

@@ -18,20 +18,17 @@ from shapely.errors import GEOSException
 from coop_drake.answers.problem import PlannerSettings
 from coop_drake.geometry.minkowski import SAFE_SIDE, FreeSpace
 from coop_drake.geometry.swept_tree import Intervals
-from coop_drake.planning.cells.as_printed import PaperExploration, refine
-from coop_drake.planning.cells.cells import Region
+from coop_drake.planning.cells.as_printed import PaperExploration
 from coop_drake.planning.cells.exploration import (
     ChannelSearched,
     Event,
     Exploration,
-    ExplorationBegan,
-    ExplorationEnded,
     ExplorationResult,
     SliceAdded,
     SliceSplit,
     Verdict,
 )
-from coop_drake.planning.cells.graph import CellGraph, GraphCell, Kind, Slices, holds, interval_overlap
+from coop_drake.planning.cells.graph import Slices, interval_overlap
 from coop_drake.planning.channel import Channel, NoChannel, unwrapped
 from coop_drake.planning.questions import relaxed
 from coop_drake.planning.search import find_channel
@@ -136,27 +133,10 @@ def test_boxes_of_a_way_through_neighbours_lie_beside_each_other(
         assert np.allclose(turns, np.where(slices.circular, np.round(turns), 0.0))
 
 
-def test_a_joint_without_limits_is_cut_at_pi_and_its_halves_meet_there() -> None:
-    slices = Slices(tree_with((1,)), 0.25)
-    assert slices.axis_widths == (2.0 * pi, 3.74, 2.0 * pi)
-    low, high = slices.split(0, 2)
-    thin = slices.split(low, 2)[0]
-    assert slices.all[thin].intervals[2] == (-pi, -0.5 * pi)
-    assert high in slices.all[thin].neighbours
-    assert slices.expanded(slices.all[thin].intervals)[2][0] < -pi
-    assert slices.holding([0.0, 0.0, 3.0 * pi]) == slices.holding([0.0, 0.0, -pi])
-
-
 def test_overlap_is_a_share_of_the_width() -> None:
     slices = Slices(team_tree(), 0.25)
     (lower, upper), *_ = slices.expanded(slices.all[1].intervals)
     assert upper - lower == pytest.approx(1.25 * 0.5 * pi)
-
-
-def test_holding_ignores_free_joints() -> None:
-    intervals = ((0.0, 1.0), (0.0, 0.1), (0.0, 0.1))
-    assert holds(intervals, [0.5 - 4 * np.pi, None, 0.05], (True, False, False))
-    assert not holds(intervals, [0.5, 0.2, None], (True, False, False))
 
 
 # Explorations: their channels, their cheapest paths, their events, and searches by cells alone.
@@ -180,27 +160,6 @@ def test_the_path_that_is_split_is_the_cheapest_one(budget: int) -> None:
     assert along == pytest.approx(least, rel=1e-12)
 
 
-@pytest.mark.parametrize("budget", [20, 60, 100])
-def test_a_search_that_goes_on_finds_the_path_of_a_new_one(budget: int) -> None:
-    exploration = Exploration(relaxed(case("closed"), (1,))[0])
-    path, graph = exploration.run(budget).path, CellGraph(exploration.slices)
-    leaves = sorted(
-        (cells[0].index, leaf, cells) for leaf, cells in exploration.graph.by_slice.items() if cells
-    )
-    for _, leaf, cells in leaves:
-        graph.add(leaf, [(cell.kind, cell.region, cell.weight) for cell in cells])
-    ends = [
-        [graph.by_slice[leaf][i] for _, leaf, cells in leaves for i, cell in enumerate(cells) if cell in its]
-        for its in (
-            [cell for cells in exploration._starts.values() for cell in cells],
-            [exploration.graph.cells[k] for cells in exploration._goals.values() for k in cells],
-        )
-    ]
-    again = graph.cheapest(ends[0], {cell.index for cell in ends[1]})
-    assert len(path) > 3
-    assert [cell.region for cell in again] == [cell.region for cell in path]
-
-
 @pytest.mark.parametrize(("name", "robots"), [("base", ()), ("base", (1,)), ("three", (2,)), ("elbow", ())])
 def test_no_relaxation_of_a_feasible_case_is_infeasible(name: str, robots: tuple[int, ...]) -> None:
     question, joints = relaxed(case(name), robots)
@@ -218,38 +177,6 @@ def test_a_relaxation_is_the_same_team_with_robots_left_out() -> None:
     part = question.tree.poses(np.concatenate((z[:3], z[5:])))
     for component, X_WC in zip(question.tree.components, part, strict=True):
         assert whole[component.name] == X_WC
-
-
-def watched(corridor: float, budget: int) -> tuple[list[Event], ExplorationResult, Exploration]:
-    problem, events = rod_problem(corridor), []
-    exploration = Exploration(problem, watch=events.append)
-    return events, exploration.run(budget), exploration
-
-
-def test_events_replay_the_subdivision() -> None:
-    events, outcome, exploration = watched(0.3, 500)
-    assert isinstance(events[0], ExplorationBegan)
-    leaves = set()
-    for event in events:
-        if isinstance(event, SliceAdded):
-            leaves.add(event.slice)
-            assert event.intervals == exploration.slices.all[event.slice].intervals
-            assert {cell.slice for cell in event.cells} <= {event.slice}
-        elif isinstance(event, SliceSplit):
-            leaves.remove(event.slice)
-            assert exploration.slices.all[event.slice].halves is not None
-    assert leaves == set(exploration.slices.leaves())
-    assert sum(isinstance(event, SliceAdded) for event in events) == outcome.slices
-
-
-def test_the_last_events_are_the_channel_and_the_verdict() -> None:
-    for corridor in (0.3, 0.19):
-        events, outcome, _ = watched(corridor, 500)
-        channel, ended = events[-2:]
-        assert isinstance(channel, ChannelSearched)
-        assert isinstance(ended, ExplorationEnded)
-        assert [cell.region for cell in channel.cells] == [cell.region for cell in outcome.path]
-        assert (ended.verdict, ended.slices) == (outcome.verdict.value, outcome.slices)
 
 
 # Explorations by cells alone: same answers, sound channels, proofs that can be checked again.
@@ -283,14 +210,6 @@ def test_cells_alone_refute_in_the_full_space() -> None:
     assert isinstance(answer, NoChannel)
     assert answer.proved
     assert report.slices < 400
-
-
-@pytest.mark.parametrize("strategy", ["cells", "paper"])
-def test_whoever_watches_is_told(strategy: str) -> None:
-    events: list[Event] = []
-    find_channel(rod_problem(0.19, PlannerSettings(strategy=strategy)), watch=events.append)
-    assert isinstance(events[0], ExplorationBegan)
-    assert isinstance(events[-2], ChannelSearched)
 
 
 # The strategy ``paper`` does what Algorithms 1 and 2 say.
@@ -347,44 +266,6 @@ def test_a_spent_budget_may_be_raised() -> None:
     exploration, outcome, _ = explored(0.5, budget=5)
     assert outcome.verdict is Verdict.BUDGET
     assert exploration.run(400).verdict is Verdict.FOUND
-
-
-def region(x: float, width: float = 1.2) -> Region:
-    return Region.of(CrossSection.square((width, 1.0)).translate((x, 0.0)))
-
-
-def cells_of(slices: Slices, *regions_by_slice: list[Region]) -> CellGraph:
-    graph = CellGraph(slices)
-    for index, regions in enumerate(regions_by_slice):
-        graph.add(index, [(Kind.FREE, part, 1.0) for part in regions])
-    return graph
-
-
-@pytest.fixture
-def path() -> list[GraphCell]:
-    """Over-cells of four slices, side by side."""
-    return [GraphCell(i, i, Kind.MIXED, region(float(i)), 1.0) for i in range(4)]
-
-
-def test_refine_returns_the_first_pair_that_does_not_connect(path: list[GraphCell]) -> None:
-    slices = Slices(team_tree(), 0.25)
-    under = cells_of(slices, [region(0.0)], [region(1.0)], [region(2.3, 0.5)], [region(3.0)])
-    source, goal = under.by_slice[0], under.by_slice[3]
-    assert refine(path, source, goal, under) == [1, 2]
-    joined = cells_of(slices, [region(0.0)], [region(1.0)], [region(2.0, 0.5)], [region(3.0)])
-    assert refine(path, joined.by_slice[0], joined.by_slice[3], joined) == [2, 3]
-
-
-def test_refine_of_a_single_cell_is_its_slice(path: list[GraphCell]) -> None:
-    under = cells_of(Slices(team_tree(), 0.25), [region(0.0)])
-    assert refine(path[:1], under.by_slice[0], under.by_slice[0], under) == [0]
-
-
-def test_refine_accepts_no_cell_of_the_last_slice_but_the_goals(path: list[GraphCell]) -> None:
-    under = cells_of(Slices(team_tree(), 0.25), [region(0.0)], [region(1.0), region(1.9, 0.1)])
-    source, (near, far) = under.by_slice[0], under.by_slice[1]
-    assert refine(path[:2], source, [far], under) == [0, 1]
-    assert refine(path[:2], source, [near], under) == [1]
 
 
 # Geometry libraries that fail now and then: verdicts degrade to undecided, never to a wrong one.
@@ -459,14 +340,6 @@ def test_no_exploration_errs_however_often_clipping_fails(failure, every: int, c
         broken.setattr(FreeSpace, "_clipped", now_and_then(failure, every))
         outcome = Exploration(problem).run(250)
     assert outcome.verdict is not (Verdict.FOUND if corridor < 0.2 else Verdict.INFEASIBLE)
-
-
-@pytest.mark.no_cover
-@pytest.mark.parametrize("corridor", [0.19, 0.3])
-def test_a_search_without_clipping_answers_nothing(monkeypatch, corridor: float) -> None:
-    monkeypatch.setattr(FreeSpace, "_clipped", raising)
-    monkeypatch.setattr(shapely, "symmetric_difference", topology_fails)
-    no_channel(rod_problem(corridor, PlannerSettings(max_slices=32)), proved=False)
 
 
 def moved_and_doubled(section: CrossSection, *others: CrossSection) -> CrossSection:

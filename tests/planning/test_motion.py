@@ -24,16 +24,13 @@ from coop_drake.planning.motion import (
     first_ways,
     quickest_motion,
 )
-from coop_drake.planning.motion_barrier import Slopes
 from coop_drake.planning.motion_limits import (
     base_chains,
     base_places,
-    follow,
     motion_limits,
     team_chains,
     times_at_limits,
 )
-from coop_drake.planning.motion_step import newton_step
 from coop_drake.planning.transitions import share_speeds
 from coop_drake.plant import planning_problem
 from coop_drake.tree.arrays import FloatArray
@@ -203,79 +200,3 @@ def test_the_team_can_brake_at_any_time_before_it_leaves_the_cell_it_may_enter(c
             fast, hard = case.used(times, case.spline(np.minimum(phase, motion.duration)))
             assert fast <= 1.0
             assert hard <= 1.0 + 5e-3
-
-
-def test_velocities_and_accelerations_are_derivatives_of_positions(case: Case) -> None:
-    """The bases', those of what they move, and what they are by z, z' and z'': by differences of a motion."""
-    tree, bodies = case.problem.tree, case.problem.limits.bodies
-    chains = base_chains(tree, case.bases, bodies)
-    chains.slides[0, 1], chains.directions[0, 1] = 1, (0.6, 0.8)  # an arm that slides
-    random, d = np.random.default_rng(1), len(case.plan.start)
-    x, v, a = random.normal(size=(3, d))
-    times = np.array([-1e-4, 0.0, 1e-4])[:, None]
-    places = base_places(chains, x + v * times + 0.5 * a * times**2)
-    moved, by = np.zeros((2, 2)), np.zeros((4, 2, d))
-
-    def both(x: FloatArray, v: FloatArray, a: FloatArray, point: int) -> FloatArray:
-        found = np.zeros((2, 2))
-        follow(chains, point, x, v, a, found, np.zeros((4, 2, d)), True)
-        return found
-
-    count = len(case.bases)
-    plain = base_chains(tree, [(int(on), (px, py)) for on, _, px, py, *_ in bodies])  # of each body alone
-    of_bodies = base_places(plain, x + v * times + 0.5 * a * times**2)[..., :2]
-    weights = np.array([[mass * (body == base) for _, mass, *_, body in bodies] for base in range(count)])
-    centres = np.tensordot(weights / weights.sum(axis=1, keepdims=True), of_bodies, axes=1)
-    for point in range(1 + 3 * count + d - 3):
-        size = follow(chains, point, x, v, a, moved, by, True)
-        centre = point - 1 - 2 * count - d + 3
-        if 1 <= point <= count or centre >= 0:
-            way = places[point - 1, :, :2] if centre < 0 else centres[centre]
-            np.testing.assert_allclose(moved[0], (way[2] - way[0]) / 2e-4, rtol=1e-5, atol=1e-6)
-            np.testing.assert_allclose(
-                moved[1], (way[2] - 2.0 * way[1] + way[0]) / 1e-8, rtol=1e-4, atol=1e-5
-            )
-        for k, unit in enumerate(1e-6 * np.eye(d)):
-            by_x = (both(x + unit, v, a, point) - both(x - unit, v, a, point)) / 2e-6
-            by_v = (both(x, v + unit, a, point) - both(x, v - unit, a, point)) / 2e-6
-            by_a = (both(x, v, a + unit, point) - both(x, v, a - unit, point)) / 2e-6
-            expected = np.stack([by_x[0], by_v[0], by_x[1], by_v[1]])
-            np.testing.assert_allclose(by[:, :size, k], expected[:, :size], rtol=1e-5, atol=1e-6)
-            np.testing.assert_allclose(by_a[1, :size], by[1, :size, k], rtol=1e-5, atol=1e-6)
-
-
-@pytest.mark.parametrize("uniform", [False, True])
-def test_newtons_step_solves_the_system_with_all_unknowns(uniform: bool) -> None:
-    """By dense matrices, with log kappa eliminated by its dependence on the control points."""
-    random, D, m, cells = np.random.default_rng(2), 5, 40, 6
-    n, ranges = m * D, [(30 * cell, 30 * cell + 60) for cell in range(cells)]
-    whole = np.eye(n + cells)
-    for begin in range(0, n - 4 * D + 1, D):
-        inside = [k for k, (first, last) in enumerate(ranges) if first <= begin and begin + 4 * D <= last]
-        for cell in [*inside, *6 * [None]]:
-            row = np.zeros(n + cells)
-            row[begin : begin + 4 * D] = random.normal(size=4 * D)
-            if cell is not None:
-                row[n + cell] = random.normal()
-            whole += np.outer(row, row)
-    band = np.array([[whole[j, j + k] if j + k < n else 0.0 for k in range(4 * D)] for j in range(n)])
-    slope = random.normal(size=n + cells)
-    slopes = Slopes(band, slope[:n], whole[n:, :n].copy(), np.diag(whole)[n:].copy(), slope[n:])
-    fixed, lengths = np.zeros((m, D), bool), np.zeros(n)
-    fixed[:3, :-1] = fixed[-3:, :-1] = fixed[1, -1] = True
-    fixed[:, -1] |= uniform
-    if uniform:
-        lengths[D - 1 :: D] = np.arange(m) - 1.0
-    places, shares, step = np.zeros((cells, 8), np.int64), np.zeros((cells, 8)), np.empty(n)
-    for cell, (first, last) in enumerate(ranges[:-1]):
-        at = np.concatenate([first // D + np.arange(3, 7), last // D + np.arange(-3, 1)])
-        places[cell], shares[cell] = np.minimum(at, m) * D - 1, random.normal(size=8)
-    found = newton_step(slopes, places, shares, fixed.ravel(), lengths, step)
-    by_points = np.zeros((cells, n))
-    np.add.at(by_points, (np.arange(cells)[:, None], places), shares)
-    free = np.eye(n)[:, ~fixed.ravel()]
-    free = np.column_stack([free, lengths]) if uniform else free
-    all_of = np.vstack([np.eye(n), by_points]) @ free
-    expected = -np.linalg.solve(all_of.T @ whole @ all_of, all_of.T @ slope)
-    np.testing.assert_allclose(step, free @ expected, rtol=1e-6, atol=1e-6)
-    assert found == pytest.approx(float(slope @ all_of @ expected), rel=1e-6)

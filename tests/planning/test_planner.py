@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import shapely
-from shapely import Point, Polygon, affinity, box, union_all
+from shapely import affinity, box, union_all
 
 from benchmarks.adversaries.questions import discs_in_a_corridor
 from benchmarks.planner.family import corridor_floor, corridor_problem, shelf_problem
@@ -27,9 +27,8 @@ from coop_drake.planning.planner import plan, quicker_plans
 from coop_drake.planning.proofs import MANY_CORNERS, Proofs, blocked_goal, clearance_bound, refuted_at_an_end
 from coop_drake.planning.questions import relaxed
 from coop_drake.planning.rescaling import Rescaling
-from coop_drake.planning.sampling.sampler import DISC_SHRINKAGE, DISC_TOLERANCE, guiding_disc
 from coop_drake.planning.search import find_path
-from coop_drake.tree.component_tree import Body, Component, ComponentTree, ConvexShape, PlanarPose, TreeJoint
+from coop_drake.tree.component_tree import Body, Component, ComponentTree, PlanarPose, TreeJoint
 from coop_drake.verification import verify_proof
 from tests.planning.test_search import rod_problem
 from tests.support.cases import case, rectangle, transport
@@ -233,12 +232,6 @@ def test_hash_seeds_and_threads_change_no_byte(tmp_path: Path) -> None:
     assert first == second
 
 
-# From the question to the goal without Drake: searched, tidied, mapped and carried out by a point mass.
-
-
-# Proofs that no plan exists: of parts of a team, from the walls near an end, and of squeezed pairs.
-
-
 # Relaxations in turns: proofs where there are proofs, none of a feasible case, covers without a gap.
 
 
@@ -294,28 +287,6 @@ def test_a_corridor_narrower_than_the_object_is_refuted_by_the_object_alone() ->
     assert proofs.run(40, 0) is Verdict.INFEASIBLE
     assert proofs.refutation is not None
     assert "the object alone" in proofs.refutation.reason
-
-
-@pytest.mark.parametrize("radius", [0.0, 0.1])
-@pytest.mark.parametrize(
-    ("corners", "inradius"),
-    [
-        ([(0, 0), (2, 0), (2, 1), (0, 1)], 0.5),
-        ([(0, 0), (3, 0), (0, 1)], 0.5 * (4.0 - np.sqrt(10.0))),
-        ([(1, 1)], 0.0),
-    ],
-)
-def test_guiding_discs_lie_inside_and_are_nearly_the_largest(corners, inradius, radius) -> None:
-    disc = guiding_disc(ConvexShape(np.array(corners, dtype=float), radius))
-    assert len(disc.vertices) == 1
-    if len(corners) < 3:
-        assert disc.radius == radius
-        return
-    ring, centre = Polygon(corners), Point(disc.vertices[0])
-    room = ring.exterior.distance(centre)
-    assert ring.contains(centre)
-    assert inradius - DISC_TOLERANCE * ring.length <= room <= inradius + 1e-12
-    assert disc.radius == pytest.approx(DISC_SHRINKAGE * room + radius, rel=1e-12)
 
 
 def test_a_goal_in_collision_is_stated() -> None:

@@ -24,7 +24,6 @@ from coop_drake.planning.search import find_channel
 from coop_drake.planning.transitions import path_through, turned_to_start
 from paper.governor_run import run_governor
 from tests.support.cases import case
-from tests.support.channels import bent_channel
 from tests.support.free_positions import FreePositions
 from tests.support.small_plan import small_plan
 
@@ -51,20 +50,6 @@ def corridor(widths=(1.0, 1.0, 1.0), *, turn=0.4, goal_joints=(None, None)):
 
 def plan_of(problem, channel, gain_set=None):
     return make_plan(problem, channel, gain_set or ScheduledGains(), gain_set_name="scheduled")
-
-
-@pytest.mark.parametrize("turns", [-2, -1, 1, 3])
-def test_angles_are_shifted_by_full_turns_to_the_start(turns):
-    problem, channel = corridor()
-    shift = np.array([2 * np.pi * turns, 0.0, 0.0])
-    turned = replace(
-        channel,
-        boxes=tuple(replace(b, lower=b.lower + shift, upper=b.upper + shift) for b in channel.boxes),
-        goal_angle=channel.goal_angle + shift[0],
-    )
-    plan, expected = plan_of(problem, turned), plan_of(problem, channel)
-    np.testing.assert_allclose(plan.goal_pose, expected.goal_pose, atol=1e-12)
-    np.testing.assert_allclose(plan.cells[1].lower, expected.cells[1].lower, atol=1e-12)
 
 
 def test_the_last_goal_is_strictly_within_the_tolerances():
@@ -178,18 +163,6 @@ def base_channel():
 @pytest.fixture(scope="module")
 def quick(base_channel):
     return quickest_plan(*base_channel, ScheduledGains(), gain_set_name="scheduled")
-
-
-def test_every_configuration_of_the_new_boxes_is_free(base_channel, quick):
-    problem, _ = base_channel
-    rng = np.random.default_rng(3)
-    for cell in quick.cells:
-        low, high = np.array(cell.tidied.bounds).reshape(2, 2)
-        for corner in rng.integers(0, 2, (6, len(cell.lower))):
-            angles = np.where(corner == 1, cell.upper, cell.lower)
-            inside = rng.uniform(low, high, (60, 2))
-            inside = inside[[cell.tidied.buffer(-1e-6).contains(Point(point)) for point in inside]]
-            assert FreePositions(problem.tree, problem.workspace, angles).free(inside).all()
 
 
 def test_the_plan_is_executable_and_quicker_than_the_channels_own_boxes(base_channel, quick):
@@ -332,11 +305,6 @@ def test_a_transition_that_is_never_left_gets_the_rule_and_two_minutes():
     first = timed(shut).transitions[0]
     rule = transition_time(first.length, first.neck, speed_per_clearance(first.gains))
     assert first.estimated_time == 120.0 + rule
-
-
-def test_a_plan_read_from_a_file_is_estimated_as_it_was_when_made():
-    plan = make_plan(*bent_channel(cells=4), ScheduledGains(), gain_set_name="any")
-    assert plan_time(timed(plan)) == plan_time(plan)
 
 
 # Limits of bases are shared so that they are kept, and by no more than they are.

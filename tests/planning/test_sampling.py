@@ -15,10 +15,9 @@ from coop_drake.answers import Found, PlannerSettings
 from coop_drake.answers.document import problem_digest
 from coop_drake.errors import GeometryError, PlanError
 from coop_drake.geometry.polygons import polygon_rings
-from coop_drake.geometry.sweeps import following, over_piece
+from coop_drake.geometry.sweeps import over_piece
 from coop_drake.geometry.swept_tree import SweptTree
 from coop_drake.laws import ScheduledGains
-from coop_drake.planning import sampled_search
 from coop_drake.planning.boxes import PairSweeps, box_arrays, box_clearance, sweeps_apart, swept_piece
 from coop_drake.planning.cells.cells import CellMaker
 from coop_drake.planning.channel import Channel, Regions, middle_of
@@ -45,13 +44,10 @@ from coop_drake.planning.sampling.collision import (
 )
 from coop_drake.planning.sampling.narrow_passages import (
     MITRE_LIMIT,
-    amount_needed,
     are_free,
     body_contacts,
     centred,
-    ease_less,
     repaired,
-    wall_contacts,
     widened_floor,
 )
 from coop_drake.planning.sampling.routes import MANY_CORNERS, disc_route, local_question
@@ -148,23 +144,6 @@ def test_a_path_begins_where_bodies_are_nearer_to_each_other_than_paths_keep(cro
     assert SubsystemHierarchy(given).gap_at_ends(0.01) == hierarchy.gap_at_ends(0.01)
 
 
-def test_no_sample_is_spent_on_the_team_where_a_part_of_it_finds_no_path(monkeypatch):
-    crowd, sampled = corridor_problem(0.7), []
-    inner = Sampler._connect
-
-    def connect(self, subsystem, *rest):
-        sampled.append(len(subsystem.joints))
-        return inner(self, subsystem, *rest)
-
-    monkeypatch.setattr(Sampler, "_connect", connect)
-    hierarchy = SubsystemHierarchy(crowd)
-    for part, most in ((None, 2), ((), 0), ((0,), 1)):
-        sampled.clear()
-        path = Sampler(hierarchy, marginal_workspace(crowd, 0.0), 0.0, 0).direct_path(500, part)
-        assert len(path) == 0
-        assert max(sampled) == most
-
-
 def test_a_path_is_sampled_around_the_channel_of_an_exploration():
     crowd = corridor_problem(1.2)
     crowd = replace(crowd, settings=PlannerSettings(strategy="cells", margin=0.0))
@@ -237,11 +216,6 @@ def test_a_point_is_as_far_from_the_walls_as_it_is_up_to_the_grid_s_reach(name: 
     assert (away[inside] == reach).any()
 
 
-def test_a_floor_without_rings_has_no_squares() -> None:
-    grid = lay_grid([], 0.5)
-    assert len(grid.edges) == grid.rows == grid.columns == 0
-
-
 @pytest.mark.parametrize("reach", [0.2, 1.5])
 def test_the_floor_near_a_way_is_all_that_a_team_can_touch(reach: float) -> None:
     floor = warehouse()
@@ -251,10 +225,6 @@ def test_the_floor_near_a_way_is_all_that_a_team_can_touch(reach: float) -> None
     assert near.intersection(touched).symmetric_difference(floor.intersection(touched)).area < 1e-9
     assert near.difference(floor).area < 1e-9
     assert near.area < floor.area
-
-
-def test_far_from_the_floor_there_is_nothing_near() -> None:
-    assert nearby(warehouse(), np.array([[50.0, 50.0]]), 1.0).is_empty
 
 
 # The compiled clearances that steer the search agree with exact footprints and with the proved cells.
@@ -412,24 +382,6 @@ def tilted(angle: float = 0.05) -> np.ndarray:
     return np.concatenate([a + (b - a) * np.linspace(0, 1, 41)[:, None] for a, b in pairwise(paths)])
 
 
-def test_the_amount_that_a_path_needs_is_what_its_tightest_sample_sticks_out():
-    problem = rod_problem(0.15)
-
-    def eased(amount):
-        return replace(problem, workspace=problem.workspace.buffer(amount, join_style="mitre"))
-
-    path = tilted(0.0)
-    needed, worst = amount_needed(eased, path, 0.1)
-    assert needed == pytest.approx(0.025, abs=2e-4)
-    assert abs(path[worst, 0]) < 1.6
-    assert are_free(eased(needed), path).all()
-    assert not are_free(eased(needed - 5e-4), path).all()
-    closer, less = ease_less(eased, tilted(), 0.1)
-    assert less < amount_needed(eased, tilted(), 0.1)[0]
-    assert less >= 0.025 - 2e-4
-    assert np.array_equal(closer[[0, -1]], tilted()[[0, -1]])
-
-
 @pytest.mark.parametrize(("corridor", "fits"), [(0.21, True), (0.19, False)])
 def test_a_path_is_repaired_only_where_it_fits(corridor, fits):
     problem = rod_problem(corridor)
@@ -447,58 +399,6 @@ def test_a_widened_floor_has_its_walls_moved_back_and_loses_thin_ones():
     corner = widened_floor(Polygon([(0, 0), (8, 0), (0, 0.2)]), 0.1)  # Its mitre would be 8 m long.
     assert corner.contains(box(0.0, 0.0, 0.1, 0.1))
     assert corner.bounds[2] < 8.0 + 0.1 * (1.0 + MITRE_LIMIT)
-
-
-@pytest.mark.parametrize(
-    ("number", "object_first", "short", "steps"),
-    [
-        (0, True, 0.0, ["path"]),
-        (1, False, 0.0, ["direct_path"]),
-        (2, True, sampled_search.CENTRED_SHORT, ["direct", "path_around"]),
-        (2, True, 1.01 * sampled_search.CENTRED_SHORT, ["direct"]),
-    ],
-    ids=["first attempt", "later attempt", "object first", "object that does not fit"],
-)
-def test_paths_on_larger_floors_are_sampled_robot_by_robot_first_then_at_once_or_around_the_object(
-    monkeypatch, number, object_first, short, steps
-):
-    """Two seeds on three floors, the largest floor first; later attempts have other seeds."""
-    problem, asked, nothing = corridor_problem(0.9), [], np.empty((0, 5))
-
-    class Recorded:
-        def __init__(self, hierarchy, floor, gap, seed, progress):
-            self.steps, size = [], floor.area - problem.workspace.area
-            asked.append((seed, gap, size, self.steps))
-
-        def path(self, samples):
-            return self._step("path", samples)
-
-        def direct_path(self, samples):
-            return self._step("direct_path", samples)
-
-        def direct(self, robots, samples):
-            assert robots == ()
-            return sampled_search.GuidePath(self._step("direct", samples), ())
-
-        def path_around(self, guide, samples):
-            return self._step("path_around", samples)
-
-        def _step(self, name, samples):
-            assert samples == sampled_search.NARROW_SAMPLES
-            self.steps.append(name)
-            return nothing
-
-    monkeypatch.setattr(sampled_search, "Sampler", Recorded)
-    monkeypatch.setattr(sampled_search, "repaired", lambda question, path, growth: (path, short))
-    assert SampledSearch(problem).narrow_attempt(number, object_first=object_first) is None
-    seeds, gaps, sizes, made = map(list, zip(*asked, strict=True))
-    first = 2 * max(0, number - 1)
-    assert seeds == [first] * 3 + [first + 1] * 3
-    assert set(gaps) == {sampled_search.BODY_GAP}
-    grown = [widened_floor(problem.workspace, growth).area for growth in sampled_search.FLOOR_GROWTHS]
-    assert sizes == pytest.approx(2 * [area - problem.workspace.area for area in grown])
-    assert grown == sorted(grown, reverse=True)
-    assert made == 6 * [steps]
 
 
 @pytest.mark.slow
@@ -520,25 +420,6 @@ def poses_near_walls(problem, count=40):
     clear = clearances(team, grid_for_team(problem.workspace, team), drawn, 0.2)
     near = drawn[(clear > 1e-3) & (clear < 0.1)]
     return near[are_free(problem, near)][:count]
-
-
-def least(contacts, count):
-    return np.array([contacts.distances[contacts.rows == k].min() for k in range(count)])
-
-
-def test_the_nearest_contact_with_a_wall_has_the_clearance_and_its_change():
-    problem = case("elbow")
-    team, path = team_arrays(problem.tree), poses_near_walls(problem)
-    assert len(path) == 40
-    edges = np.concatenate([np.hstack((r, following(r))) for r in polygon_rings(problem.workspace)])
-    grid = grid_for_team(problem.workspace, team)
-    found = wall_contacts(team, path, edges, 0.15)
-    np.testing.assert_allclose(least(found, len(path)), clearances(team, grid, path, 0.2), atol=1e-12)
-    step = 1e-6 * np.random.default_rng(1).normal(size=path.shape)
-    moved = wall_contacts(team, path + step, edges, 0.2)
-    first = found.distances + np.einsum("md,md->m", found.gradients, step[found.rows])
-    expected = np.array([first[found.rows == k].min() for k in range(len(path))])
-    np.testing.assert_allclose(least(moved, len(path)), expected, atol=1e-10)
 
 
 def test_the_nearest_contact_of_bodies_is_their_distance():

@@ -20,7 +20,7 @@ from coop_drake.planning.planner import plan
 from coop_drake.planning.search import find_channel
 from coop_drake.tree.component_tree import Body, Component, ComponentTree, ConvexShape, PlanarPose, TreeJoint
 from coop_drake.verification import verify_plan, verify_proof
-from tests.support.cases import case, disc, rectangle, transport
+from tests.support.cases import case, disc, rectangle
 from tests.support.moved import Similarity
 from tests.support.short_search import sample_little
 from tests.support.soundness import assert_channel_is_sound, no_channel, sound_channel
@@ -112,11 +112,6 @@ def test_a_goal_in_collision_is_refuted_at_once(
     assert report.slices <= 128
 
 
-def test_joints_with_a_goal_reach_it() -> None:
-    problem = replace(case("base"), goal_joints=(-1.0, 0.6))
-    sound_channel(problem)
-
-
 def test_progress_is_told_and_may_interrupt() -> None:
     told: list[str] = []
 
@@ -128,14 +123,6 @@ def test_progress_is_told_and_may_interrupt() -> None:
     with pytest.raises(KeyboardInterrupt):
         find_channel(case("base"), stop)
     assert told == ["sampling paths"]
-
-
-@pytest.mark.slow
-@pytest.mark.no_cover
-def test_a_millimetre_of_room_is_found() -> None:
-    """The corridor is three millimetres wider than one in which the object alone is proved to be stuck."""
-    problem = transport(0.78)
-    sound_channel(problem)
 
 
 # Questions at the edge of what can be asked: joints at limits, numbers that mean nothing, odd scales.

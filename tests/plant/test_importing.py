@@ -306,6 +306,7 @@ BROKEN = [
     ("hello", "line 1: syntax error"),
     (ARM[:300], "line 1: unclosed token"),
     ("<sdf version='1.9'/>", "must have a single <model>"),
+    ('<!DOCTYPE sdf [<!ENTITY a "b">]>' + ARM, "the entity a is declared"),
     (Arm(extra="<blah/>").text(), "not defined in SDF"),
     (exchanged(ARM, ("<mass>6.0", "<mass>-6")), "central inertia"),
     (exchanged(ARM, ("<izz>0.6", "<izz>9")), "triangle inequality"),

@@ -20,14 +20,12 @@ from coop_drake.tree.component_tree import point_levers, turn_levers
 from tests.support.cases import CASES, case
 from tests.support.edited_scenario import (
     MODELS,
-    check_refusal,
     exchanged,
     shipped,
     team_of,
     write_edited,
     write_with_robot,
 )
-from tests.support.robot_dynamics import robot_dynamics
 from tests.support.robot_models import Arm, urdf_arm
 
 START = "object: {x: 0.9, y: 2, theta: 1.57}"
@@ -194,22 +192,6 @@ def test_a_negative_limit_of_urdf_is_refused_before_drake_ends_the_process(tmp_p
         planning_problem(load_scenario(write_with_robot(tmp_path, text, "urdf")))
 
 
-@pytest.mark.parametrize(
-    ("said", "key", "allowed"),
-    [
-        ("{robot_0: {base_speed: 0}}", "limits.robot_0.base_speed", "a positive number"),
-        ("{'*': {friction: 0}}", "limits.*.friction", "a positive number"),
-        ("{robot_1: {friction: -0.5}}", "limits.robot_1.friction", "a positive number"),
-        ("{robot_0: {base_speed: .nan}}", "limits.robot_0.base_speed", "a finite number"),
-        ("{robot_0: {joint_rates: [-1]}}", "limits.robot_0.joint_rates[0]", "a positive number"),
-        ("{'*': {joint_accelerations: [0]}}", "limits.*.joint_accelerations[0]", "a positive number"),
-        ("{robot_7: {base_speed: 1}}", "limits.robot_7", "a robot, one of robot_0, robot_1"),
-    ],
-)
-def test_impossible_limits_of_a_scenario_are_refused(said, key, allowed, tmp_path):
-    check_refusal(tmp_path, (STATED, f"{STATED}limits: {said}"), key, ..., allowed)
-
-
 def test_as_many_limits_as_joints_are_expected(tmp_path):
     for key in ("joint_rates", "joint_accelerations"):
         path = write_edited(tmp_path, (STATED, f'{STATED}limits: {{"*": {{{key}: [1, 2]}}}}'))
@@ -327,15 +309,6 @@ def test_patterns_fix_all_but_what_is_named_null(tmp_path):
     assert joints_of_first(team) == ["robot_0::joint_2"]
     team, _ = team_of(load_scenario(fixing(tmp_path, arm, '{"joint_?": 0, joint_0: 0.5}')))
     assert joints_of_first(team) == []
-
-
-def test_the_robots_own_plant_has_the_same_joints_and_masses(tmp_path):
-    scenario = load_scenario(fixing(tmp_path, Arm(joints=(UP, LIFT)), "{joint_1: 0.1}"))
-    alone = robot_dynamics(scenario, 0)
-    assert [joint.name() for joint in alone.joints] == ["joint_0"]
-    alone.set_state(np.zeros(4), np.zeros(4))
-    assert alone.mass_matrix().shape == (4, 4)
-    assert alone.mass_matrix()[0, 0] == pytest.approx(8.0)
 
 
 def test_other_kinds_of_joints_are_fixed_at_zero(tmp_path):

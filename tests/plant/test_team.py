@@ -94,30 +94,6 @@ def test_efforts_and_rotors_that_a_file_states_are_kept(tmp_path):
         assert [actuator.effort_limit() for actuator in actuators] == [kept, np.inf]
 
 
-def test_robot_of_two_models_is_one_robot(tmp_path):
-    hand = (
-        "<sdf version='1.9'><model name='hand'><link name='palm'><collision name='c'><geometry><sphere>"
-        "<radius>0.05</radius></sphere></geometry></collision></link>"
-        "<frame name='tip'><pose>0.1 0 0 0 0 0</pose></frame></model></sdf>"
-    )
-    model = "{name: robot_0, file: package://coop_drake_models/long_blue.sdf}"
-    weld = "- add_weld: {parent: object::grasp_0, child: robot_0::gripper}"
-    path = write_edited(
-        tmp_path,
-        (f"add_model: {model}", f"add_model: {model}\n- add_model: {{name: hand, file: hand.sdf}}"),
-        (
-            weld,
-            weld.replace("robot_0::gripper", "hand::tip")
-            + "\n- add_weld: {parent: robot_0::gripper, child: hand::palm}",
-        ),
-        hand_sdf=hand,
-    )
-    team, _builder = team_of(load_scenario(path))
-    assert [robot.name for robot in team.robots] == ["robot_0", "robot_1"]
-    assert team.robots[0].joint_names == ("robot_0::elbow",)
-    assert team.robots[0].gripper_frame.name() == "tip"
-
-
 def test_the_plant_has_the_coordinates_of_the_object_and_the_joints_and_torques_in_their_order(team):
     size = 3 + len(team.joints)
     assert team.plant.num_positions() == size
@@ -156,46 +132,6 @@ def own_state(team, robot, context, z, z_rate):
     joints = slice(3 + robot.q_slice.start, 3 + robot.q_slice.stop)
     pose = base_poses(team, context)[robot.index]
     return np.concatenate([pose, z[joints]]), np.concatenate([base_rate, z_rate[joints]])
-
-
-def test_kinetic_energies_of_object_and_robots_add_up_to_the_team_s(scenario, team):
-    context = team.plant.CreateDefaultContext()
-    z, z_rate = moving(team, context)
-    inertia = team.object_inertia
-    arm = np.array([[np.cos(z[2]), -np.sin(z[2])], [np.sin(z[2]), np.cos(z[2])]]) @ inertia.p_LLcm
-    speed = z_rate[:2] + z_rate[2] * np.array([-arm[1], arm[0]])
-    energy = 0.5 * inertia.mass * speed @ speed + 0.5 * inertia.inertia_about_com * z_rate[2] ** 2
-    for robot in team.robots:
-        own = robot_dynamics(scenario, robot.index)
-        own.set_state(*own_state(team, robot, context, z, z_rate))
-        rate = own_state(team, robot, context, z, z_rate)[1]
-        energy += 0.5 * rate @ own.mass_matrix() @ rate
-    assert energy == pytest.approx(team.plant.CalcKineticEnergy(context), rel=1e-9)
-
-
-def test_grasp_moves_in_both_plants_alike(scenario, team):
-    context = team.plant.CreateDefaultContext()
-    z, z_rate = moving(team, context)
-    for robot in team.robots:
-        own = robot_dynamics(scenario, robot.index)
-        own.set_state(*(state := own_state(team, robot, context, z, z_rate)))
-        X_WE = robot.gripper_frame.CalcPoseInWorld(context)
-        assert own.grasp_pose()[:2] == pytest.approx(X_WE.translation()[:2], abs=1e-7)
-        twist = robot.gripper_frame.CalcSpatialVelocityInWorld(context).get_coeffs()[PLANAR]
-        assert own.grasp_jacobian() @ state[1] == pytest.approx(twist, abs=1e-7)
-
-
-def test_mass_matrix_of_a_shipped_robot_by_hand():
-    """Straight arm: 8 kg; base, link 1 and link 2 at 0, 0.175 and 0.56 m from the base."""
-    own = robot_dynamics(shipped("base"), 0)
-    own.set_state(np.zeros(4), np.zeros(4))
-    matrix = own.mass_matrix()
-    link_1, link_2 = (0.35**2 + 0.1**2) / 12.0, (0.42**2 + 0.1**2) / 12.0
-    about_base = 0.5 * 6.0 * 0.25**2 + link_1 + 0.175**2 + link_2 + 0.56**2
-    assert matrix[:2, :2] == pytest.approx(8.0 * np.eye(2))
-    assert matrix[1, 2] == pytest.approx(0.175 + 0.56)
-    assert matrix[2, 2] == pytest.approx(about_base, rel=1e-4)
-    assert matrix[3, 3] == pytest.approx(link_2 + 0.21**2, rel=1e-4)
 
 
 def applied(team, wrenches):

@@ -5,7 +5,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from shapely import normalize
 
 from coop_drake.answers.problem import PlannerSettings
 from coop_drake.errors import ScenarioError
@@ -24,9 +23,9 @@ from coop_drake.scenario import (
 )
 from coop_drake.scenario.document import parse, write
 from coop_drake.typed_data import convert_class
-from tests.support.cases import CASES, case
+from tests.support.cases import CASES
 from tests.support.edited_scenario import shipped, write_edited
-from tests.support.scenarios import MODELS, write_scenario
+from tests.support.scenarios import MODELS
 
 SHORT = """
 workspace:
@@ -43,21 +42,6 @@ start:
 goal:
   object: {x: 2.5, y: 2, theta: 0}
 """
-
-
-@pytest.mark.parametrize("name", sorted(CASES))
-def test_shipped_scenarios_are_the_cases_with_both_gain_sets(name):
-    scenario, expected = shipped(name), case(name)
-    assert scenario.name == name
-    assert normalize(scenario.workspace.polygon).equals_exact(expected.workspace, 1e-9)
-    start = scenario.start.object
-    assert (start.x, start.y, start.theta) == tuple(expected.start[:3])
-    assert all(value == 0.0 for values in scenario.start.joints.values() for value in values)
-    goal = scenario.goal.object
-    assert (goal.x, goal.y, goal.theta) == tuple(expected.goal_pose)
-    assert scenario.goal.joints == {}
-    assert scenario.passes
-    assert scenario.gain_sets == {"scheduled": ScheduledGains(), "table_2": FixedGains()}
 
 
 def test_short_file_gets_defaults(tmp_path):
@@ -142,17 +126,6 @@ def test_keys_beside_the_preset_replace_its_own_and_no_others(tmp_path):
     assert (unlimited.actuators.base_force, unlimited.actuators.lag) == (None, 0.005)
 
 
-def test_a_preset_of_null_is_none(tmp_path):
-    assert loaded(tmp_path, "{preset: null, mass_error: 0.1}").deployment == Deployment(mass_error=0.1)
-
-
-def test_a_scenario_with_a_preset_is_written_and_read_back(tmp_path):
-    scenario = loaded(tmp_path, "{preset: mobile_base, actuators: {base_force: null}}")
-    again = tmp_path / "again.scenario.yaml"
-    again.write_text(dump_scenario(scenario))
-    assert load_scenario(again).deployment == scenario.deployment
-
-
 @pytest.mark.parametrize(
     ("deployment", "message"),
     [
@@ -205,15 +178,6 @@ def test_what_is_dumped_is_read_back_and_selected(tmp_path, gains):
 def test_texts_that_begin_like_numbers_are_read_back_as_texts(text):
     assert parse(write({"key": text, text: 2.0})) == {"key": text, text: 2.0}
     assert parse("[1e3, 0e6jek, -2e5x]") == [1000.0, "0e6jek", "-2e5x"]
-
-
-def test_the_file_is_a_section_of_a_scenario(tmp_path):
-    text = dump_gains("mine", ScheduledGains(age_phase=0.5))
-    plain = write_scenario(tmp_path / "room.scenario.yaml").read_text()
-    indented = "".join(f"  {line}\n" for line in text.splitlines())
-    (tmp_path / "room.scenario.yaml").write_text(f"{plain}\ngains:\n{indented}")
-    scenario = load_scenario(tmp_path / "room.scenario.yaml")
-    assert scenario.gain_sets[scenario.selected_gains] == ScheduledGains(age_phase=0.5)
 
 
 def test_a_name_selects_and_nothing_changes_without_one():

@@ -39,15 +39,6 @@ def bent_corridor(width, goal=(5.1, 5.0, 0.1), robots=1):
     )
 
 
-def number_places(value, way=()):
-    """Ways to every number of a document."""
-    if isinstance(value, dict):
-        return [place for key, entry in value.items() for place in number_places(entry, (*way, key))]
-    if isinstance(value, list):
-        return [place for k, entry in enumerate(value) for place in number_places(entry, (*way, k))]
-    return [way] if isinstance(value, int | float) and not isinstance(value, bool) else []
-
-
 def entry_at(document, way):
     """What stands at the end of a way."""
     for step in way:

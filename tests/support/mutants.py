@@ -8,13 +8,11 @@ import itertools
 import json
 import math
 import random
-import re
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import islice, zip_longest
 from typing import Any
-from xml.etree import ElementTree
 
 import numpy as np
 
@@ -211,61 +209,6 @@ def yaml_mutants(data: dict[str, Any], seed: int) -> Iterator[Mutant]:
         yield Mutant(f"bomb of {many} as a number", used.encode())
 
 
-def model_mutants(content: bytes, key: str, seed: int, count: int) -> list[Mutant]:
-    """Robot models of broken XML, with elements and attributes misspelt, and with values that are none."""
-    text, found = content.decode(), []
-    named = text.replace('name="base"', 'name="&j;"', 1)
-    bomb = "".join(f'<!ENTITY {b} "{f"&{a};" * 10}">' for a, b in itertools.pairwise("abcdefghij"))
-    nested = "<model name='a'>" * 20_000 + "</model>" * 20_000
-    for kind, changed in (
-        ("another root", "<html><body/></html>"),
-        ("two roots", text + "<sdf version='1.9'/>"),
-        ("an attribute twice", text.replace('name="base"', 'name="base" name="base"', 1)),
-        ("a bare ampersand", text.replace('name="base"', 'name="base & co"', 1)),
-        ("entities of entities", f'<!DOCTYPE m [<!ENTITY a "base">{bomb}]>' + named.partition("?>")[2]),
-        ("a file as an entity", '<!DOCTYPE m [<!ENTITY j SYSTEM "file:///etc/hostname">]>' + named),
-        ("20000 elements in each other", f"<sdf version='1.9'>{nested}</sdf>"),
-        ("a prefix of nothing", text.replace("<link", "<x:link", 1).replace("</link", "</x:link", 1)),
-    ):
-        found.append(Mutant(kind, changed.encode(), key))
-    begin = text.find("?>") + 3
-    found += [
-        Mutant("cut off", content[:place], key)
-        for place in random.Random(seed).sample(range(begin, text.rindex("</")), 20)
-    ]
-    return found + sampled(_of_elements(content, key), count, seed)
-
-
-def _of_elements(content: bytes, key: str) -> Iterator[Mutant]:
-    root = ElementTree.fromstring(content)
-    for place, element in enumerate(root.iter()):
-
-        def changed(kind: str, change, place=place, element=element) -> Mutant:
-            tree = copy.deepcopy(root)
-            change(list(tree.iter())[place])
-            return Mutant(f"{kind} at {element.tag} {place}", ElementTree.tostring(tree), key)
-
-        yield changed("misspelt element", lambda one: setattr(one, "tag", f"{one.tag}_"))
-        for name in element.attrib:
-            yield changed(
-                "misspelt attribute", lambda one, name=name: one.set(f"{name}_", one.attrib.pop(name))
-            )
-        for name, value in {None: (element.text or "").strip(), **element.attrib}.items():
-            if name in ("version", "name") or not re.fullmatch(r"[-+0-9.eE ]+", value):
-                continue
-            parts, field = value.split(), name or element.tag
-            limit = field in ("lower", "upper", "effort", "velocity")
-            wrong = [" ".join([bad, *parts[1:]]) for bad in ("wide", "nan", "0.1.2", "1m", "0xzz")]
-            wrong += [] if limit else [" ".join([bad, *parts[1:]]) for bad in ("inf", "1e400")]
-            if len(parts) > 1:
-                wrong += [f"{value} 7", *([] if field == "diffuse" else [" ".join(parts[:-1])])]
-            for bad in wrong:
-                yield changed(
-                    f"{bad.split()[0] if len(bad.split()) == len(parts) else 'a length'} for a number",
-                    lambda one, name=name, bad=bad: one.set(name, bad) if name else setattr(one, "text", bad),
-                )
-
-
 def json_mutants(document: dict[str, Any], seed: int) -> Iterator[Mutant]:
     """Broken JSON, JSON of something else, and heads of other files."""
     text = json.dumps(document)
@@ -287,67 +230,6 @@ def json_mutants(document: dict[str, Any], seed: int) -> Iterator[Mutant]:
     for name, values in (("format", ("coop_drake plan 2", "", "plan")), ("version", (0, 1.5, 99, "2", -1))):
         for value in values:
             yield Mutant(f"another {name}", signed({**document, name: value}), name)
-
-
-def unsigned_mutants(document: dict[str, Any], seed: int) -> Iterator[Mutant]:
-    """Digests of something else, and numbers changed by hand under the digest of others."""
-    for digest in ("", "0" * 64, document["digest"].upper()):
-        yield Mutant("another digest", in_json({**document, "digest": digest}), "digest")
-    numbers = [place for place, value in leaves(document) if type(value) is float]
-    for place in random.Random(seed).sample(numbers, 20):
-        changed = in_json(put(document, place, at(document, place) + 1e-6))
-        yield Mutant(f"a number changed by hand at {place}", changed)
-
-
-def polygon_mutants(document: dict[str, Any]) -> Iterator[Mutant]:
-    """Rings that enclose nothing or meet themselves, and holes that take nothing or all away."""
-    for place, value in leaves(document):
-        if not isinstance(value, dict) or "outer" not in value:
-            continue
-        ring = value["outer"]
-        (x, y), (a, b) = ring[:2]
-        far = [[x + 1e4, y], [x + 1e4 + 1.0, y], [x + 1e4, y + 1.0]]
-        for kind, changes in (
-            ("no corners", {"outer": []}),
-            ("two corners", {"outer": ring[:2]}),
-            ("corners in a line", {"outer": [ring[0], [0.5 * (x + a), 0.5 * (y + b)], ring[1]]}),
-            ("a spike", {"outer": [ring[0], [x + 0.3, y + 0.4], *ring]}),
-            ("a bow tie", {"outer": [[0.0, 0.0], [1.0, 1.0], [1.0, 0.0], [0.0, 1.0]]}),
-            ("a corner of three", {"outer": [[*ring[0], 0.0], *ring[1:]]}),
-            ("a hole outside", {"holes": [far]}),
-            ("a hole as large as all", {"holes": [ring]}),
-        ):
-            yield Mutant(
-                f"{kind} at {place}", signed(put(document, place, {**value, **changes})), dotted(place)
-            )
-
-
-def plan_mutants(document: dict[str, Any]) -> Iterator[Mutant]:
-    """Plans that cannot be executed, or that answer another question; of the length that others have."""
-
-    def changed(place: Place, value: Any, key: Place | None = None) -> Mutant:
-        return Mutant(
-            f"another {place[-1]}", signed(put(document, place, value)), dotted(place if key is None else key)
-        )
-
-    for k, (cell, transition) in enumerate(zip(document["cells"], document["transitions"], strict=True)):
-        own, here = ("cells", k), ("transitions", k)
-        far = [[x + 50.0, y] for x, y in cell["tidied"]["outer"]]
-        yield changed((*own, "tidied", "outer"), far, ("transitions", k - 1, "target") if k else ("start",))
-        yield changed((*own, "lower"), cell["upper"], (*own, "upper"))
-        yield changed((*own, "lower"), cell["lower"][:-1], own)
-        yield changed((*here, "target"), [transition["target"][0] + 50.0, transition["target"][1]])
-        yield changed((*here, "goal_lower"), [value - 9.0 for value in transition["goal_lower"]], here)
-        yield changed((*here, "gains", "funnel"), "square")
-        yield changed((*here, "gains", "stiffness"), 0.0)
-        yield changed((*here, "inradius"), -1.0)
-    for name in ("start", "goal_pose"):
-        for index, value in enumerate(document[name]):
-            yield changed((name,), put(document[name], (index,), value + 20.0))
-        yield changed((name,), document[name][:-1])
-    yield changed(("joint_names",), [f"{name}_b" for name in document["joint_names"]])
-    yield changed(("problem",), "0" * 64)
-    yield changed(("goal_joints",), [1.0, *document["goal_joints"][1:]])
 
 
 def log_mutants(content: bytes, seed: int) -> Iterator[Mutant]:

@@ -246,37 +246,3 @@ def test_every_hand_over_is_reached_and_leaves_margin(half_height, half_overlap,
     # Nothing takes the readiness away again while other conditions are still waited for, once at rest.
     assert ready[-1]
     assert clearance_margin(margins[-1], stiffness, inradius) == pytest.approx(0.75, abs=0.01)
-
-
-lengths = st.floats(-1.0, 1.0)
-vectors = st.tuples(lengths, lengths).map(np.array)
-accelerations = st.tuples(*[st.floats(-50.0, 50.0)] * 3).map(np.array)
-
-
-@law
-@given(
-    st.lists(vectors, min_size=2, max_size=8),
-    vectors,
-    accelerations,
-    st.floats(-5.0, 5.0),
-    st.floats(0.1, 20.0),
-    st.floats(0.01, 10.0),
-    st.data(),
-)
-def test_shares_sum_to_the_command(offsets, com_offset, acceleration, rate, mass, inertia, data):
-    weights = np.array(
-        data.draw(st.lists(st.floats(0.01, 1.0), min_size=len(offsets), max_size=len(offsets)))
-    )
-    weights /= weights.sum()
-    of_com = laws.acceleration_at(*com_offset, *acceleration, rate)
-    shares = np.array(
-        [
-            laws.wrench_share(*(com_offset - offset), *of_com, acceleration[2], mass, inertia, weight)
-            for offset, weight in zip(offsets, weights, strict=True)
-        ]
-    )
-    commanded = np.array([mass * of_com[0], mass * of_com[1], inertia * acceleration[2]])
-    # Every robot carries its part of the force.
-    assert shares[:, :2] == pytest.approx(weights[:, None] * commanded[:2], rel=1e-12, abs=1e-12)
-    total = laws.total_wrench(shares, np.array(offsets), com_offset, 0.0)
-    assert total == pytest.approx(commanded, rel=1e-12, abs=1e-10)

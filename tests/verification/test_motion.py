@@ -29,7 +29,6 @@ from coop_drake.verification import verify_file, verify_plan
 from coop_drake.verification.gains import check_limits, check_speeds
 from coop_drake.verification.motion import _Mover, _movers, check_motion
 from coop_drake.verification.runs.bodies import component_stages
-from tests.support.cases import team_tree
 from tests.support.certificates import changed, write
 from tests.support.motions import passing, planned_motion
 from tests.support.small_scenario import small_scenario
@@ -431,14 +430,6 @@ def test_what_curves_velocities_and_accelerations_is_bounded(tree, seed):
     for before, now, after, bound in zip(*found, bounds, strict=True):
         curved = np.linalg.norm(after - 2.0 * now + before, axis=1) / e**2
         assert (curved <= bound * (1.0 + 1e-3) + 1e-3).all()
-
-
-def test_the_bound_is_what_a_turn_at_a_constant_rate_has():
-    points = ((1.0, component_stages(team_tree(1, 1), 0), (0.6, 0.8)),)
-    mover = _Mover("base", "m", 1.0, 1.0, None, np.inf, points)
-    still, rate = np.zeros((1, 4)), np.array([[0.0, 0.0, 2.0, 0.0]])
-    of_v, of_a = mover.curving(still, rate, still, still)
-    assert (of_v[0], of_a[0]) == (8.0, 16.0)  # w^3 r and w^4 r
 
 
 # Random alterations.

@@ -22,7 +22,7 @@ from coop_drake.scenario import load_scenario
 from coop_drake.tree.component_tree import ComponentTree
 from coop_drake.tuning import CRITERIA, GainTrial, Limit, Objective, Search, TrialOutcome
 from coop_drake.viz import write_figures
-from coop_drake.viz.block_diagram import INPUTS, OUTPUTS, block_diagram_figure, signal_flow
+from coop_drake.viz.block_diagram import block_diagram_figure, signal_flow
 from coop_drake.viz.drawing_processes import DrawingProcesses
 from coop_drake.viz.figures import (
     angle_figure,
@@ -199,16 +199,6 @@ def test_a_limit_that_is_far_from_all_values_is_named_and_does_not_press_the_cur
     assert forces.get_ylim()[1] == pytest.approx(1.25 * largest)
 
 
-def test_stops_on_the_way_are_counted():
-    problem, log = case("base"), synthetic_log(case("base"))
-    stopped = log.object_twist.copy()
-    stopped[100:120] = stopped[200:220] = 0.0
-    speeds, *_ = summary_figure(problem, replace(log, object_twist=stopped)).axes
-    assert speeds.get_title(loc="left").endswith("near stops on the way: 2")
-    speeds, *_ = summary_figure(problem, log).axes
-    assert speeds.get_title(loc="left").endswith("near stops on the way: none")
-
-
 def test_figure_7_shows_the_angle_its_funnel_and_a_dashed_line_at_every_switch():
     problem = case("base")
     log = synthetic_log(problem)
@@ -240,13 +230,6 @@ def test_the_angle_of_a_team_that_passes_is_in_an_interval_of_its_cell_and_no_fu
         for each in (log, passed)
     ]
     assert words == [["funnel", "θ"], ["interval", "θ"]]
-
-
-def test_a_jump_at_a_switch_is_broken_not_sloped():
-    log = replace(synthetic_log(case("base")), times=np.arange(3.0), cell_index=np.array([0, 0, 1]))
-    times, values = break_at_switches(log, np.array([1.0, 1.0, 5.0]))
-    np.testing.assert_array_equal(times, [0.0, 1.0, 2.0, 2.0])
-    np.testing.assert_array_equal(values, [1.0, 1.0, np.nan, 5.0])
 
 
 BEFORE = dict.fromkeys(CRITERIA, 1.0) | {"time": 20.0, "peak_force": 200.0}
@@ -304,19 +287,6 @@ def test_every_block_and_every_connection_of_the_loop_is_there(loop):
     }
 
 
-def test_what_a_controller_hears_and_says_is_there_without_what_is_only_looked_at(controller):
-    blocks = {block.name: block for block in controller.blocks}
-    assert set(blocks[INPUTS].outputs) == {"robot_state", "object_pose", "current_cell"}
-    assert set(blocks[OUTPUTS].inputs) == {"robot_effort", "ready"}
-    assert blocks["reference_governor"].kind == "ReferenceGovernor"
-
-
-def test_signals_go_from_left_to_right_but_those_that_are_held(controller):
-    columns = {block.name: block.column for block in controller.blocks}
-    back = {s.source for s in controller.signals if columns[s.source] >= columns[s.sink]}
-    assert back == {"governor_state"}
-
-
 def test_the_picture_names_every_block_and_port(loop, controller):
     figure = block_diagram_figure(loop, robot=1)
     texts = {text.get_text() for ax in figure.axes for text in ax.texts}
@@ -371,15 +341,6 @@ def test_both_write_what_they_draw_and_end(drawing, tmp_path):
     names = {path.name for path in tmp_path.iterdir()}
     assert {"transport.html", "fig04_start_and_goal.png", "fig05_path.png", "summary.png"} <= names
     assert not any(alive(process.pid) for process, _ in processes._running.values())
-
-
-def test_without_figures_the_recording_alone_is_written(tmp_path):
-    problem, scenario = case("base"), load_scenario(MODELS / "base.scenario.yaml")
-    with DrawingProcesses(figures=False) as processes:
-        processes.begin(scenario, problem, synthetic_plan(problem))
-        processes.draw(synthetic_log(problem), tmp_path)
-        processes.wait("recording", "figures")
-    assert [path.name for path in tmp_path.iterdir()] == ["transport.html"]
 
 
 def test_what_goes_wrong_in_a_process_is_raised_here(drawing, tmp_path):

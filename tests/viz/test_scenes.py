@@ -274,20 +274,6 @@ def test_straight_lines_between_kept_frames_meet_all_frames(tolerance):
     assert np.abs(between(values, kept) - values).max() <= tolerance
 
 
-@pytest.mark.parametrize(
-    ("values", "tolerance", "longest", "kept"),
-    [
-        (FRAMES[:, None], 1e-9, 400, [0, 399]),
-        (np.where(FRAMES > 0.5, 1.0, 0.0)[:, None], 0.01, 400, [0, 199, 200, 399]),
-        (np.zeros((100, 1)), 1.0, 30, [0, 30, 60, 90, 99]),
-        (np.zeros((1, 3)), 1.0, 5, [0]),
-    ],
-    ids=["straight line", "jump", "no two further apart than allowed", "one frame"],
-)
-def test_kept_frames_by_hand(values, tolerance, longest, kept):
-    assert kept_frames(values, tolerance, longest=longest) == kept
-
-
 OBJECT = "/team/illustration/object/body"
 
 
@@ -325,28 +311,6 @@ def test_the_object_moves_as_it_was_logged(text):
     keys, turns = track(text, OBJECT, "quaternion")
     angles = np.unwrap(2.0 * np.arctan2(turns[:, 2], turns[:, 3]))
     np.testing.assert_allclose(np.interp(times, keys, angles), logged[:, 2], rtol=0, atol=1e-2)
-
-
-def test_the_goals_frame_is_as_high_as_the_object(text):
-    """The shipped object is a box 0.2 m high whose middle is 0.4 m above the floor."""
-    told = [message for message in messages(text) if message.get("path") == "/plan/goal_pose/frame"]
-    packed = told[0]["object"]["geometries"][0]["data"]["attributes"]["position"]["array"]
-    heights = np.frombuffer(packed.data, dtype=np.float32).reshape(-1, 3)[:, 2]
-    np.testing.assert_allclose([heights.min(), heights.max()], [0.3, 0.5], atol=1e-6)
-
-
-def test_every_track_lasts_as_long_as_the_slider(text):
-    ends = {
-        track(text, path, name)[0][-1]
-        for path, name in (
-            (OBJECT, "position"),
-            ("/forces/robot_0", "scale"),
-            ("/plan/cells/000", "visible"),
-            ("/motion/trail/<object>", "geometry[drawRange].count"),
-        )
-    }
-    (duration,) = re.findall(r'"duration": ([\d.]+)', text)
-    assert ends == {float(duration)}
 
 
 def test_the_cells_take_turns_as_they_were_logged(text):
@@ -425,16 +389,6 @@ def test_a_minute_of_motion_that_no_straight_line_follows_stays_under_6_mb():
     assert len(page.encode()) < 6e6
 
 
-def test_collision_geometry_moves_with_the_bodies_where_it_is_asked_for():
-    scenario, plan, log = base(samples=40)
-    look = dataclasses.replace(scenario.visualization, show_collision=True)
-    page = recording_html(dataclasses.replace(scenario, visualization=look), plan, log)
-    seen, solid = (
-        track(page, f"/team/{role}/object/body", "position") for role in ("illustration", "proximity")
-    )
-    np.testing.assert_array_equal(seen[1], solid[1])
-
-
 @pytest.mark.parametrize(
     ("end", "words"),
     [
@@ -449,14 +403,6 @@ def test_the_page_says_how_it_ended(end, words):
     said = page_content(scenario, plan, dataclasses.replace(log, **end), **facts)["verdict"]
     walls, bodies = log.workspace_clearance.min(), log.body_clearance.min()
     assert said == f"{words}; smallest clearance {walls:.3f} m to walls, {bodies:.3f} m between bodies"
-
-
-def test_a_run_that_starts_at_its_goal_is_recorded(tmp_path):
-    scenario, plan, log = base()
-    histories = {name: value[:1] for name, value in vars(log).items() if isinstance(value, np.ndarray)}
-    path = tmp_path / "transport.html"
-    write_recording(scenario, plan, dataclasses.replace(log, **histories), path)
-    assert path.stat().st_size > 1e6
 
 
 # Obstacles on the floor and the colours of robots.

@@ -34,7 +34,7 @@ from coop_drake.planning.cells.graph import Kind, holds, share_facet
 from coop_drake.tree.component_tree import nearest_turn
 from coop_drake.watching import keyframes, record_search, scene_page, search_states, write_pictures
 from coop_drake.watching.keyframes import THETA, layers, on_turn, projection_of
-from coop_drake.watching.pictures import cut, keyframe_figure, on_sheet
+from coop_drake.watching.pictures import cut, keyframe_figure
 from coop_drake.watching.recording import BOXES
 from tests.planning.test_search import rod_problem
 from tests.support.cli import invoke
@@ -133,19 +133,6 @@ def test_layers_fill_the_turn_and_hold_what_meets_them(found):
         }
 
 
-@pytest.mark.parametrize(
-    ("interval", "parts"),
-    [
-        ((0.0, 1.0), [(0.0, 1.0)]),
-        ((2 * pi, 2 * pi + 1.0), [(0.0, 1.0)]),
-        ((-pi / 4 - 0.5, -pi / 4 + 0.5), [(-pi / 4, -pi / 4 + 0.5), (7 * pi / 4 - 0.5, 7 * pi / 4)]),
-        ((-pi, pi), [(-pi / 4, pi), (pi, 7 * pi / 4)]),
-    ],
-)
-def test_intervals_of_theta_are_brought_onto_the_turn_drawn(interval, parts):
-    np.testing.assert_allclose(sorted(on_turn(interval)), parts, rtol=0, atol=1e-12)
-
-
 def test_a_cut_tiles_theta_and_the_joint_without_gap_or_overlap():
     recorded = record_search(jointed_rod(), "cells")
     for frame in keyframes(recorded, 8):
@@ -172,17 +159,6 @@ def test_the_papers_algorithms_and_the_whole_portfolio_can_be_watched():
     assert all(cell.kind is Kind.FREE for cell in boxes[-1].state.channel)
     refuted = keyframes(rod_recording(NARROW, "portfolio"), 6)
     assert refuted[-1].state.verdict == "infeasible"
-
-
-def test_the_same_question_gives_the_same_storyboard(found):
-    _, frames = found
-    again = keyframes(rod_recording(WIDE), 12)
-    for first, second in zip(frames, again, strict=True):
-        assert (first.headline, first.counters) == (second.headline, second.counters)
-        assert first.state.leaves.keys() == second.state.leaves.keys()
-        for piece, other in zip(first.path, second.path, strict=True):
-            np.testing.assert_array_equal(piece.positions, other.positions)
-            np.testing.assert_array_equal(piece.angles, other.angles)
 
 
 @pytest.mark.parametrize("corridor", [WIDE, NARROW])
@@ -217,14 +193,6 @@ def test_no_more_states_than_asked_for_the_last_one_the_verdict_no_split_lost(mo
     halved = [(event.slice, event.axis) for event in recorded if isinstance(event, SliceSplit)]
     assert [(leaf.slice, axis) for state in found for leaf, axis in state.splits] == halved
     assert len(found[-1].history) == sum(isinstance(event, ChannelSearched) for event in recorded)
-
-
-def test_states_lie_evenly_over_the_steps():
-    recorded = rod_recording().events
-    every = [state.slices for state in search_states(recorded, 10_000)]
-    steps = [every.index(state.slices) for state in search_states(recorded, 6)]
-    gaps = np.diff(steps)
-    assert gaps.max() - gaps.min() <= 3
 
 
 def test_a_single_keyframe_is_refused():
@@ -294,13 +262,6 @@ def test_one_picture_a_keyframe_a_sheet_and_a_moving_picture(shown, tmp_path):
     with Image.open(tmp_path / "think.gif") as moving:
         assert moving.n_frames == len(frames)
     assert (tmp_path / "think.gif").stat().st_size < 6e6
-
-
-def test_the_sheet_shows_the_first_and_the_last_keyframe(shown):
-    _, frames, _ = shown
-    chosen = on_sheet(frames)
-    assert (chosen[0], chosen[-1]) == (0, len(frames) - 1)
-    assert len(chosen) <= 6
 
 
 def test_the_path_through_the_angles_shows_what_is_proved_as_the_one_on_the_floor_does(shown):
