@@ -18,7 +18,6 @@ from coop_drake.typed_data import field_types
 from docs.generate.__main__ import PAGES
 from docs.generate.api_pages import api_pages
 from docs.generate.links import first_page, for_site
-from docs.generate.port_tables import as_markdown
 from docs.generate.scenario_page import sections
 from tests.support.small_loop import joint_names, small_maps, small_scenario
 from tests.support.small_plan import small_plan
@@ -71,25 +70,6 @@ def test_the_robot_that_is_shown_makes_a_team(tmp_path):
     assert len(team.joint_names) == 2
 
 
-def test_the_block_that_is_shown_stands_in_for_the_funnel():
-    names = {}
-    exec(shown("controller_block.md", "python"), names)  # the page's own code
-    plan = small_plan(joint_names(small_scenario()))
-    block = names["SpringAxes"](plan, [0, 1], stiffness=4.0, damping=2.0)
-    outputs = {block.get_output_port(i).get_name() for i in range(block.num_output_ports())}
-    assert outputs == set(re.findall(r"output  ``(\w+)``", AxisPpc.__doc__))
-    context = block.CreateDefaultContext()
-    block.GetInputPort("object_state").FixValue(context, [0, 0, 0.7, 0, 0, 0.1])
-    block.GetInputPort("robot_state").FixValue(context, [1, 2, 3, 0.4, 5, 6, 7, -0.3])
-    last = len(plan.cells) - 1
-    block.GetInputPort("current_cell").FixValue(context, [last, 3.0])
-    target = 0.5 * (plan.transitions[last].goal_lower + plan.transitions[last].goal_upper)[:2]
-    expected = -4 * (np.array([0.7, 0.4]) - target) - 2 * np.array([0.1, -0.3])
-    assert block.GetOutputPort("axis_acceleration").Eval(context) == pytest.approx(expected)
-    bounds = [*plan.cells[last].lower[:2], *plan.cells[last].upper[:2]]
-    assert block.GetOutputPort("funnels").Eval(context) == pytest.approx(bounds)
-
-
 def test_a_transport_arrives_with_the_block_that_is_shown(capsys):
     block, use = all_shown("controller_block.md", "python")
     assert len([line for line in use.splitlines() if line.strip()]) <= 10
@@ -106,24 +86,6 @@ def test_only_named_blocks_that_exist_can_be_replaced():
     plan = small_plan(joint_names(scenario))
     with pytest.raises(ValueError, match="'axis_pcc' is not allowed; expected one of object_estimator"):
         build_closed_loop(scenario, plan, small_maps(), replacements={"axis_pcc": AxisPpc})
-
-
-def test_tables_of_ports_become_tables_of_markdown():
-    table = """What it does.
-
-    ======= ===== ==== ========
-    input   ``a`` 2    the one
-                       and only
-    output  ``b`` 1    the other
-    ======= ===== ==== ========
-    """
-    rows = [line for line in as_markdown(re.sub("^    ", "", table, flags=re.MULTILINE)).splitlines() if line]
-    assert rows[1:] == [
-        "|  | port | size | meaning |",
-        "| --- | --- | --- | --- |",
-        "| input | ``a`` | 2 | the one and only |",
-        "| output | ``b`` | 1 | the other |",
-    ]
 
 
 def test_links_lead_somewhere_beside_the_sources():

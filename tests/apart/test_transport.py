@@ -116,52 +116,6 @@ def session_of(ends):
     return ends.sessions[msg.WORLD].number
 
 
-@pytest.mark.parametrize("with_keys", [False, True])
-def test_everything_crosses_and_comes_in_its_order(with_keys, team_keys):
-    team = Team(team_keys if with_keys else None)
-    try:
-        with pytest.raises(MessagingError, match=r"came from robot 0, robot 1, the supervisor \(waited"):
-            team.world.open(0.05)
-        supervisor, *robots = ends = [team.join(index) for index in (msg.SUPERVISOR, 0, 1)]
-        deadline = monotonic() + LIMIT
-        while team.world.present() != {0, 1, msg.SUPERVISOR} or supervisor.present() != {0, 1, msg.WORLD}:
-            assert monotonic() < deadline
-            for each in (team.world, *ends):
-                if (taken := each.receive(0.001)) is not None:
-                    assert isinstance(taken[1], msg.Hello | msg.Welcome)
-        for number in range(1, 4):
-            for k, robot in enumerate(robots):
-                sample = msg.Sample(
-                    number, 0.1 + number, True, False, (), 0.0, 0.0, (1.0, 2.0, 0.5), (0.1 * k,)
-                )
-                assert team.world.send(k, sample)
-                assert news(robot) == (msg.WORLD, sample)
-                assert robot.send(msg.SUPERVISOR, msg.Ready(number, ready=True))
-                assert news(supervisor) == (k, msg.Ready(number, ready=True))
-                assert supervisor.send(k, msg.Switch(number + 1, 17))
-                assert news(robot) == (msg.SUPERVISOR, msg.Switch(number + 1, 17))
-                assert robot.send(msg.WORLD, EFFORT)
-                assert news(team.world) == (k, EFFORT)
-        tick, status = (
-            msg.Tick(7, 0.035, True, False, (1, 1)),
-            msg.Status(7, 0.035, True, (0, 0), 2, 0.0, False, (), 4),
-        )
-        assert team.world.send(msg.SUPERVISOR, tick)
-        assert news(supervisor) == (msg.WORLD, tick)
-        assert supervisor.send(msg.WORLD, status)
-        assert news(team.world) == (msg.SUPERVISOR, status)
-        assert team.world.send(0, msg.Goodbye(0))
-        assert news(robots[0]) == (msg.WORLD, msg.Goodbye(0))
-        assert (
-            [robot.sent(msg.SUPERVISOR) for robot in robots]
-            == [supervisor.sent(k) for k in range(2)]
-            == [3, 3]
-        )
-        assert not any(each.refusals.total for each in (team.world, *ends))
-    finally:
-        team.close()
-
-
 def test_who_does_not_answer_is_named_with_its_address_and_nothing_is_sent_to_it(team):
     robot = team.join(0)
     address = team.book.supervisor.address

@@ -239,10 +239,6 @@ def test_a_slice_is_blocked_where_two_pieces_overlap_in_all_of_it():
     assert "do not tile" in refused(question, short)
 
 
-def test_joints_are_within_their_limits_where_a_team_starts():
-    assert "beyond the limits" in refused(altered(TEAM, [2, 4, 0, 1.01], "start"), plan())
-
-
 def test_it_runs_in_an_empty_python_on_two_files(tmp_path):
     (tmp_path / "question.json").write_text(json.dumps(QUESTION))
     (tmp_path / "answer.json").write_text(json.dumps(PROOF))

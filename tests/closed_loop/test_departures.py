@@ -56,16 +56,6 @@ def pushed(force):
 
 
 MILD = {
-    "sampling": sampled(RATE),
-    "sampling, quicker": sampled(),
-    "saturation": Deployment(actuators=ActuatorLimits(base_force=50.0)),
-    "noise": sampled(RATE, measurements=Measurements(1e-3, 5e-4, 1e-3)),
-    "delay": sampled(measurements=Measurements(delay=0.005)),
-    "model error": Deployment(mass_error=0.5),
-    "late reports": sampled(RATE, messages=Messages(delay=0.2)),
-    "a biased pose in all": sampled(robots={"*": RobotDepartures(pose_bias=PoseBias(x=0.005))}),
-    "a late sample": of_one(sample_offset=0.0045),
-    "push": pushed(20.0),
     "motors and the floor": sampled(
         actuators=ActuatorLimits(lag=0.005),
         floor=Floor(coulomb_friction=10.0, viscous_friction=5.0, slope=0.003),
@@ -83,10 +73,8 @@ MILD = {
         silence=Silence(0.5, 0.1), blocked=BlockedWheels(0.5, 0.02), slip=WheelSlip(0.7, 0.3, 0.1),
     ),
 }  # fmt: skip
-"""Single departures, and three mixtures of weaker ones; single ones of every kind are in ``ARRIVING``."""
+"""Three mixtures of weak departures; single ones of every kind are in ``ARRIVING``."""
 
-QUICK = {"sampling", "noise", "delay", "model error", "push"}
-"""Departures that are no slow tests."""
 
 FUNNEL, GOAL = "to its funnel is", "waits until the object reaches its goal position"
 REPORTS = "waits until the cell planner receives the robots' reports"
@@ -191,11 +179,10 @@ def test_each_departure_alone_arrives_with_room_to_spare(name):
     assert repr(outcome) != repr(compiled_run(ideal()))  # it does depart
 
 
+@pytest.mark.slow
 @pytest.mark.no_cover
-@pytest.mark.parametrize(
-    "name", [name if name in QUICK else pytest.param(name, marks=pytest.mark.slow) for name in MILD]
-)
-def test_a_mild_departure_is_survived(name):
+@pytest.mark.parametrize("name", MILD)
+def test_mild_departures_are_survived(name):
     log = run(MILD[name])
     assert log.violation == ""
     assert log.reached

@@ -11,10 +11,9 @@ from coop_drake.answers import PlannerSettings, PlanningProblem
 from coop_drake.cli.results import ResultFolder
 from coop_drake.diagnosis import Answer, diagnose, diagnosing, diagnosis_figure, facts_of, sentences_of
 from coop_drake.diagnosis import diagnosing as relaxations
-from coop_drake.diagnosis.contacts import colliding_stretches, contacts, deepest, narrowest_gap, overlaps
+from coop_drake.diagnosis.contacts import colliding_stretches, contacts, narrowest_gap, overlaps
 from coop_drake.diagnosis.diagnosing import SLICES, changes, find_passages, try_changes
 from coop_drake.diagnosis.variants import BudgetedPlanner, WidenedFloor, on_open_floor
-from coop_drake.drawing import save_figure
 from coop_drake.planning import Channel, find_channel
 from coop_drake.tree.component_tree import Body, Component, ComponentTree, PlanarPose, TreeJoint
 from tests.support.cases import case, disc, rectangle, team_tree
@@ -182,12 +181,6 @@ def test_an_undecided_question_says_what_remained_mixed(monkeypatch):
     assert facts_of(diagnosis)["mixed"][0]["share_of_axis"] == diagnosis.mixed[0].width_fraction
 
 
-def test_the_same_diagnosis_has_the_same_picture(rod, tmp_path):
-    for number in range(2):
-        save_figure(diagnosis_figure(*rod), tmp_path / f"{number}.svg")
-    assert (tmp_path / "0.svg").read_bytes() == (tmp_path / "1.svg").read_bytes()
-
-
 def test_an_interrupt_comes_through():
     def stop(stage, share):
         raise KeyboardInterrupt
@@ -212,11 +205,6 @@ def test_a_body_too_tall_for_a_room_sticks_out_on_both_sides():
     assert found[0].wall[1] == pytest.approx(0.0)
     assert found[0].point[1] == pytest.approx(-0.15)
     assert found[1].wall[1] == pytest.approx(1.0)
-
-
-def test_a_body_inside_sticks_out_nowhere():
-    assert contacts(ROOM, lone(disc(0.4)), np.array([2.0, 0.5, 0.3])) == []
-    assert deepest(ROOM, lone(disc(0.4)), np.array([2.0, 0.5, 0.3])) == 0.0
 
 
 def test_a_wall_corner_that_pierces_a_body_counts():

@@ -6,7 +6,7 @@ from shapely import MultiPoint, MultiPolygon, Polygon, box, union_all
 from shapely.affinity import translate
 
 from coop_drake.geometry import minkowski
-from coop_drake.geometry.minkowski import SAFE_SIDE, FreeSpace, common, to_polygon
+from coop_drake.geometry.minkowski import FreeSpace, common, to_polygon
 from coop_drake.geometry.polygons import polygon_rings
 from tests.support.trees import room
 
@@ -89,30 +89,6 @@ def test_safe_sides_bracket_the_truth(points: list[tuple[float, float]], x: floa
     if room().contains(placed):
         assert over.intersects(here)
     assert over.buffer(1e-9).contains(under)
-
-
-def test_disconnected_positions_come_apart() -> None:
-    dumbbell = union_all([box(0, 0, 2, 2), box(2, 0.9, 4, 1.1), box(4, 0, 6, 2)])
-    disc = 0.3 * np.column_stack((np.cos(np.arange(8) * np.pi / 4), np.sin(np.arange(8) * np.pi / 4)))
-    parts = FreeSpace.under(dumbbell).minus(disc).decompose()
-    assert len(parts) == 2
-
-
-def test_a_hole_stays_a_hole() -> None:
-    floor = Polygon(box(0, 0, 4, 4).exterior, [box(1.8, 1.8, 2.2, 2.2).exterior])
-    square = np.array([[-0.2, -0.2], [0.2, -0.2], [0.2, 0.2], [-0.2, 0.2]])
-    (part,) = FreeSpace.under(floor).minus(square).decompose()
-    polygon = to_polygon(part)
-    assert len(polygon.interiors) == 1
-    assert Polygon(polygon.interiors[0]).area == pytest.approx(0.8**2, abs=10 * SAFE_SIDE)
-
-
-def test_what_is_smaller_than_the_footprint_holds_none() -> None:
-    """An island within the footprint, as a hole in the walls around it would, must not pass for room."""
-    square = np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]])
-    islands = MultiPolygon([box(0, 0, 0.4, 0.4), box(2, 0, 4, 2), box(5, 0, 6.5, 0.4)])
-    found = as_shapely(FreeSpace.under(islands).minus(square))
-    assert found.symmetric_difference(box(2.5, 0.5, 3.5, 1.5)).area < 1e-4
 
 
 @settings(max_examples=40)

@@ -9,16 +9,10 @@ from shapely.affinity import rotate
 
 from coop_drake.geometry.polygons import separated
 from coop_drake.geometry.sweeps import (
-    circumscribed,
-    closed_directions,
     common_disc,
-    edge_directions,
     grown,
-    half_planes_polygon,
-    normals,
     over_prismatic,
     over_revolute,
-    support,
     under_prismatic,
     under_revolute,
 )
@@ -27,39 +21,6 @@ from coop_drake.tree.component_tree import PlanarPose
 from tests.support.trees import trees
 
 SQUARE = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
-
-
-def test_supports_at_the_edges_rebuild_the_polygon() -> None:
-    directions = closed_directions(edge_directions(SQUARE), 0.75 * np.pi)
-    rebuilt = Polygon(circumscribed(directions, support(SQUARE, directions)))
-    assert rebuilt.symmetric_difference(Polygon(SQUARE)).area == pytest.approx(0.0, abs=1e-7)
-
-
-def test_directions_are_closed_and_distinct() -> None:
-    directions = closed_directions(np.array([0.0, 0.0, 1e-9, 6.2]), 0.5)
-    gaps = np.diff(np.append(directions, directions[0] + 2 * np.pi))
-    assert gaps.min() > 0.0
-    assert gaps.max() <= 0.5 + 1e-12
-
-
-def test_half_planes_of_a_polygon_rebuild_it_from_inside() -> None:
-    angles = edge_directions(SQUARE)
-    offsets = (normals(angles) * SQUARE).sum(axis=1)
-    rebuilt = half_planes_polygon(angles, offsets)
-    assert Polygon(SQUARE).contains(Polygon(rebuilt))
-    assert Polygon(rebuilt).area == pytest.approx(1.0, abs=1e-7)
-
-
-def test_redundant_and_repeated_half_planes_change_nothing() -> None:
-    angles = np.concatenate((edge_directions(SQUARE), edge_directions(SQUARE), [0.3]))
-    offsets = np.concatenate(((normals(edge_directions(SQUARE)) * SQUARE).sum(axis=1), [5.0] * 5))
-    rebuilt = half_planes_polygon(angles, offsets)
-    assert Polygon(rebuilt).area == pytest.approx(1.0, abs=1e-7)
-
-
-def test_half_planes_that_exclude_each_other_leave_nothing() -> None:
-    angles = np.array([0.0, np.pi, 0.5 * np.pi, -0.5 * np.pi])
-    assert len(half_planes_polygon(angles, np.array([1.0, -2.0, 1.0, 1.0]))) == 0
 
 
 @pytest.mark.parametrize(("shift", "apart"), [(1.1, True), (0.9, False), (-1.1, True), (0.0, False)])

@@ -21,7 +21,6 @@ from tests.support.ring_team import PRISMATIC, REVOLUTE, ring_team
 
 PERIOD, LAG, WIDTH = 0.005, 0.005, 0.06
 
-
 LONG_AFTER = 100.0  # bounds at rest [s]
 
 
@@ -76,15 +75,6 @@ def turned(name, *configurations):
         free = -np.linalg.solve(plant.CalcMassMatrix(context), plant.CalcBiasTerm(context))
         found.append(free[team.velocity_index[3:]])
     return np.array(found)
-
-
-def test_turning_bends_arms_of_two_joints_more_than_arms_of_one():
-    (elbow,) = turned("elbow", [-0.05, 0.22, 0.45, -0.95])
-    assert np.abs(elbow).max() == pytest.approx(11.1, abs=0.1)
-    assert elbow[2] * elbow[3] < 0.0
-    assert np.abs(elbow).max() < ScheduledGains().turning_coupling
-    middles = np.linspace(-1.2, 1.2, 7)
-    assert np.abs(turned("base", *((a, b) for a in middles for b in middles))).max() < 4.0
 
 
 @pytest.mark.parametrize(("name", "coupling"), [("base", 3.94), ("elbow", 12.78)])

@@ -11,9 +11,9 @@ from coop_drake.laws.robot_dynamics import (
     estimate_object,
     motion_room,
 )
+from coop_drake.plant import build_robot_plant, robot_chain
 from coop_drake.robustness.tracking import gain_sums
-from coop_drake.scenario import Deployment, Measurements
-from tests.support.planar_arm import random_arm, random_state
+from coop_drake.scenario import Deployment, Measurements, load_scenario
 
 
 def wave(number, size, length, phase):
@@ -190,16 +190,20 @@ def test_the_observer_s_loop_is_well_damped_with_the_age_as_a_delay(age):
     assert found.max() <= 1.01 * final
 
 
-@pytest.mark.parametrize("joints", [0, 2])
-def test_constant_accelerations_are_predicted_exactly(joints):
-    rng = np.random.default_rng(20 + joints)
-    arm, (z, v) = random_arm(rng, joints), random_state(rng, joints)
-    robot, pose, grasp = np.concatenate([z, v]), rng.normal(size=3), rng.normal(size=2)
-    rows = np.tile(rng.normal(size=6 + joints), (5, 1))
+@pytest.fixture(scope="module")
+def chain():
+    """The chain of a robot with two joints."""
+    return robot_chain(build_robot_plant(load_scenario("elbow"), 0))
+
+
+def test_constant_accelerations_are_predicted_exactly(chain):
+    rng, n = np.random.default_rng(22), 5
+    (z, v), pose, grasp = rng.uniform(-1.8, 1.8, (2, n)), rng.normal(size=3), rng.normal(size=2)
+    robot, rows = np.concatenate([z, v]), np.tile(rng.normal(size=3 + n), (5, 1))
     predicted, predicted_pose, state, period = np.empty(robot.size), np.empty(3), np.empty(6), 0.02
-    measurements.predict(arm.chain(), grasp, robot, pose, rows, period, predicted, predicted_pose)
-    estimate_object(arm.chain(), grasp, motion_room(arm.chain()), robot, pose, state)
-    time, n = 5 * period, 3 + joints
+    measurements.predict(chain, grasp, robot, pose, rows, period, predicted, predicted_pose)
+    estimate_object(chain, grasp, motion_room(chain), robot, pose, state)
+    time = 5 * period
     for found, x, rate, a in (
         (predicted[:n], z, v, rows[0, 3:]),
         (predicted_pose, pose, state[3:], rows[0, :3]),
@@ -208,17 +212,16 @@ def test_constant_accelerations_are_predicted_exactly(joints):
     np.testing.assert_allclose(predicted[n:], v + time * rows[0, 3:], atol=1e-12)
 
 
-def test_what_is_kept_is_what_was_commanded():
+def test_what_is_kept_is_what_was_commanded(chain):
     rng = np.random.default_rng(5)
-    arm, (z, v) = random_arm(rng, 2), random_state(rng, 2)
-    robot, pose, load = np.concatenate([z, v]), rng.normal(size=3), rng.uniform(0.1, 1.0, size=7)
+    robot, pose, load = rng.uniform(-1.8, 1.8, 10), rng.normal(size=3), rng.uniform(0.1, 1.0, size=7)
     linear, axes, kept = rng.normal(size=2), rng.normal(size=3), np.empty(8)
-    measurements.wanted_accelerations(arm.chain(), load, robot, pose, linear, axes, kept)
+    measurements.wanted_accelerations(chain, load, robot, pose, linear, axes, kept)
     state, command = np.empty(6), np.empty(6)
-    estimate_object(arm.chain(), load[:2], motion_room(arm.chain()), robot, pose, state)
+    estimate_object(chain, load[:2], motion_room(chain), robot, pose, state)
     end_effector_command(load, state, linear, axes, command)
     np.testing.assert_array_equal(kept[:3], [*linear, axes[0]])
     np.testing.assert_array_equal(
-        kept[3:6], base_acceleration(arm.chain(), motion_room(arm.chain()), robot, command, axes)
+        kept[3:6], base_acceleration(chain, motion_room(chain), robot, command, axes)
     )
     np.testing.assert_array_equal(kept[6:], axes[1:])

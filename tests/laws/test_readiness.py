@@ -13,21 +13,15 @@ from tests.support.readiness import margin_of, square_with_clearance
 
 PERIOD = 0.005
 
-
 ROWS = 2 * readiness.mean_samples(PERIOD)
-
 
 TIMES = PERIOD * np.arange(ROWS)
 
-
 PLACE = np.array([1.0, 2.0, 0.5, 0.0])
-
 
 EXACT = readiness.ArrivalGoal(PLACE, np.array([0.01, 0.02, np.inf]), np.zeros(3))
 
-
 CERTIFIED = EXACT._replace(errors=np.array([0.003, 0.002, 0.002]))
-
 
 NOISE = np.array([1e-3, 1e-3, 5e-4, 5e-4])
 
@@ -130,7 +124,6 @@ def test_levels_have_names():
 
 GOAL = {"goal_lower": np.array([0.8, -0.2]), "goal_upper": np.array([1.0, 0.2])}
 
-
 INTERVALS = {"slice_lower": np.array([0.0, -1.0]), "slice_upper": np.array([1.0, 1.0]), **GOAL}
 
 
@@ -149,9 +142,7 @@ def table_of(intervals, resting):
 
 TABLE, _ = table_of(INTERVALS, [0.4, 0.5])
 
-
 NEXT_TABLE, NEXT_GAINS = table_of(NEXT_INTERVALS, [0.9, 0.0])
-
 
 ROW = NEXT_GAINS.governor_row(replace(NEXT_GAINS, stiffness=90.0))
 

@@ -355,31 +355,6 @@ def test_a_stop_within_the_first_period_of_a_start_stands_in_the_motion_before_i
     assert team.motions[0, w.BRAKE_AT] == pytest.approx(hold)
 
 
-def test_one_that_rests_before_the_goal_creeps_there():
-    schedule = even_schedule(3)
-    end = schedule.ends[-1]
-    team = Team(schedule, [end, end, end - 0.05])
-    team.until(arrived)
-    assert (team.phases == end).all()
-
-
-def test_a_robot_whose_monitor_asks_refuses_the_start_and_the_next_one_is_taken_by_all():
-    schedule = even_schedule(4)
-    team = Team(schedule, [0.0] * 3)
-    team.until(lambda team: team.words[-1, -1, w.EPOCH] == 1.0)  # said, not yet heard
-    team.alarms[1] = w.ASKS
-    team.until(lambda team: team.kinds[1] == w.REST and team.words[1, 1, w.EPOCH] == 1.0)
-    assert team.kinds == [w.ARMED, w.REST, w.ARMED]
-    team.until(all_are(w.REST))
-    assert (team.phases == 0.0).all()
-    for _ in range(20):
-        team.step()
-    assert team.code == (w.DEPARTS, 1)
-    team.alarms[1] = w.THERE
-    team.until(arrived)
-    assert team.words[0, 0, w.EPOCH] == 2.0
-
-
 def test_no_start_leads_beyond_the_cell_after_the_least_begun():
     """Neither does the supervisor say such a start, nor does a robot take it."""
     schedule = even_schedule(6)
@@ -456,16 +431,6 @@ def test_the_common_brake_stops_all_at_once_and_a_new_start_ends_it():
     team.until(all_are(w.ARMED))
     assert [team.words[k, k, w.HOLD] for k in range(3)] == [inf] * 3
     team.until(arrived)
-
-
-@pytest.mark.parametrize("other", [2, 3])
-def test_a_hold_reaches_a_robot_by_way_of_another_one_or_of_the_supervisor(other):
-    team = Team(even_schedule(6), [0.0] * 3)
-    team.until(lambda team: team.time > 1.5)
-    team.closed, team.alarms[0] = {(0, 1), (0, 5 - other)}, w.ASKS
-    for _ in range(3):
-        team.step()
-    assert team.words[1, 1, w.HOLD] == team.words[0, 0, w.HOLD] < inf
 
 
 def test_a_robot_that_brakes_passes_on_a_hold_before_its_own():

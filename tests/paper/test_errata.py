@@ -13,12 +13,10 @@ from coop_drake.geometry.minkowski import FreeSpace, to_polygon
 from coop_drake.geometry.sweeps import over_revolute, under_revolute
 from coop_drake.laws import (
     Funnel,
-    ScheduledGains,
     energy_margin,
     funnel_bounds,
     total_wrench,
     tracking_energy,
-    transition_gains,
     wrench_share,
 )
 from coop_drake.laws.readiness import clearance_margin, interval_margin
@@ -26,12 +24,14 @@ from coop_drake.laws.robot_dynamics import motion_room, robot_effort
 from coop_drake.planning.cells import as_printed
 from coop_drake.planning.cells.as_printed import PaperExploration
 from coop_drake.planning.cells.exploration import Verdict
+from coop_drake.plant import robot_chain
+from coop_drake.scenario import load_scenario
 from paper import printed
 from paper.governor_run import box_clearance, run_governor, straight_field
 from paper.table_1 import CORRECTED
 from tests.planning.test_search import rod_problem
-from tests.support.planar_arm import random_arm, random_state
 from tests.support.prescribed import prescribed_acceleration
+from tests.support.robot_dynamics import robot_dynamics
 from tests.support.robot_matrices import consistent_projector, robot_acceleration
 from tests.support.table_1 import table_transitions
 
@@ -343,14 +343,6 @@ def test_e43_the_wanted_rate_leaves_minus_k1_z1_and_not_its_square():
         assert abs(a * v - b - -k1 * z1**2) > 0.5
 
 
-def test_gains_of_the_schedule_bound_the_log_term_for_every_row_of_table_1():
-    for transition in table_transitions(CORRECTED):
-        gains = transition_gains(ScheduledGains(), clearance=0.1, **transition)
-        x, lower, upper = transition["resting"], transition["slice_lower"], transition["slice_upper"]
-        pull = (upper - lower) / ((x - lower) * (upper - x)) * np.abs(np.log((x - lower) / (upper - x)))
-        assert np.all(gains.log_gain * pull <= ScheduledGains().log_acceleration * (1.0 + 1e-12))
-
-
 # E21: the sign of the cross term in (21) and (31).
 
 FORCE, TORQUE = np.array([3.0, 4.0]), 0.7
@@ -388,27 +380,25 @@ def test_e21_opposite_grasps_hide_the_sign():
     assert total_as_printed(OPPOSITE) == pytest.approx([*FORCE, TORQUE], abs=1e-14)
 
 
-# E23, E25 and E33: what a robot's own dynamics need, on closed-form planar arms.
+# E23, E25 and E33: what a robot's own dynamics need; robots of shipped teams have one joint or two.
 
-JOINTS = [1, 2, 3]
-
-
-def moving_arms(joints, count=40):
-    rng = np.random.default_rng(joints)
-    for _ in range(count):
-        arm = random_arm(rng, joints)
-        z, v = random_state(rng, joints)
-        _, jacobian, rate_term = arm.end_effector(z, v)
-        yield rng, arm, z, v, jacobian, rate_term
+TEAMS = ["base", "elbow"]
 
 
-@pytest.mark.parametrize("joints", JOINTS)
-def test_e23_forces_through_the_printed_projector_disturb_the_grasp(joints):
+def moving_robot(team, count=40):
+    """A robot in random states: random numbers, Drake's model of the robot, z, z' and J."""
+    rng, robot = np.random.default_rng(1), robot_dynamics(load_scenario(team), 0)
+    for z, v in rng.uniform(-1.8, 1.8, (count, 2, 3 + len(robot.joints))):
+        robot.set_state(z, v)
+        yield rng, robot, z, v, robot.grasp_jacobian()
+
+
+@pytest.mark.parametrize("team", TEAMS)
+def test_e23_forces_through_the_printed_projector_disturb_the_grasp(team):
     """Only the projector weighted by the inertia leaves the end effector's acceleration alone."""
     disturbed, left_alone = [], []
-    for rng, arm, z, v, jacobian, _ in moving_arms(joints):
-        mass_matrix, _ = arm.dynamics(z, v)
-        force = rng.normal(size=z.size) * 10.0
+    for rng, robot, z, _, jacobian in moving_robot(team):
+        mass_matrix, force = robot.mass_matrix(), rng.normal(size=z.size) * 10.0
         through = (printed.projector(jacobian), consistent_projector(mass_matrix, jacobian))
         for projector, errors in zip(through, (disturbed, left_alone), strict=True):
             errors.append(np.linalg.norm(jacobian @ np.linalg.solve(mass_matrix, projector @ force)))
@@ -416,17 +406,18 @@ def test_e23_forces_through_the_printed_projector_disturb_the_grasp(joints):
     assert max(left_alone) < 1e-9
 
 
-@pytest.mark.parametrize("joints", JOINTS)
-def test_e25_the_end_effector_twist_does_not_tell_how_the_jacobian_changes(joints):
+@pytest.mark.parametrize("team", TEAMS)
+def test_e25_the_end_effector_twist_does_not_tell_how_the_jacobian_changes(team):
     """J^+ x' is z' less its motion in the null space, on which J' acts too."""
     printed_errors, corrected_errors = [], []
-    for _, arm, z, v, jacobian, rate_term in moving_arms(joints):
-        h = 1e-5
-        before, now, after = (arm.end_effector(z + t * v, v) for t in (-h, 0.0, h))
-        # With z'' = 0 the grasp's acceleration, from its path alone, is what J' contributes.
-        truth = (after[1] @ v - before[1] @ v)[:2] / (2.0 * h)
-        assert truth == pytest.approx((after[0] - 2.0 * now[0] + before[0]) / h**2, abs=1e-3)
-        jacobian_rate = (after[1] - before[1]) / (2.0 * h)
+    for _, robot, z, v, jacobian in moving_robot(team):
+        rate_term, around, h = robot.grasp_bias(), [], 1e-5
+        for time in (-h, h):
+            robot.set_state(z + time * v, v)
+            around.append(robot.grasp_jacobian())
+        # With z'' = 0 the grasp's acceleration is what J' contributes.
+        jacobian_rate = (around[1] - around[0]) / (2.0 * h)
+        truth = (jacobian_rate @ v)[:2]
         as_printed = printed.rate_term(jacobian_rate, jacobian, jacobian @ v)
         printed_errors.append(np.linalg.norm(as_printed[:2] - truth))
         corrected_errors.append(np.linalg.norm(rate_term[:2] - truth))
@@ -434,20 +425,22 @@ def test_e25_the_end_effector_twist_does_not_tell_how_the_jacobian_changes(joint
     assert np.median(printed_errors) > 1e4 * max(corrected_errors)
 
 
-@pytest.mark.parametrize("joints", JOINTS)
-def test_e33_task_space_forces_reach_the_actuators_through_the_transpose(joints):
+@pytest.mark.parametrize("team", TEAMS)
+def test_e33_task_space_forces_reach_the_actuators_through_the_transpose(team):
     """J cannot multiply a wrench unless the robot has no joints; J^T makes the wrench appear at the grasp."""
-    for rng, arm, z, v, jacobian, rate_term in moving_arms(joints, count=5):
-        wrench = rng.normal(size=3)
+    for rng, robot, z, v, jacobian in moving_robot(team, count=5):
+        wrench, chain = rng.normal(size=3), robot_chain(robot)
         with pytest.raises(ValueError, match="mismatch"):
             jacobian @ wrench
-        mass_matrix, bias = arm.dynamics(z, v)
-        at_grasp, axes, torque = rng.normal(size=3), rng.normal(size=1 + joints), np.empty(3 + joints)
-        wanted = robot_acceleration(at_grasp, axes[1:], jacobian=jacobian, jacobian_rate_term=rate_term)
+        at_grasp, axes, torque = rng.normal(size=3), rng.normal(size=z.size - 2), np.empty(z.size)
+        wanted = robot_acceleration(
+            at_grasp, axes[1:], jacobian=jacobian, jacobian_rate_term=robot.grasp_bias()
+        )
         command = np.concatenate([at_grasp, wrench])
-        robot_effort(arm.chain(), motion_room(arm.chain()), np.concatenate([z, v]), command, axes, torque)
+        robot_effort(chain, motion_room(chain), np.concatenate([z, v]), command, axes, torque)
         # (2) solved for the acceleration, with the object pushing back.
-        got = np.linalg.solve(mass_matrix, torque - bias - jacobian.T @ wrench)
+        bias = robot.inertial_effort(np.zeros(z.size))
+        got = np.linalg.solve(robot.mass_matrix(), torque - bias - jacobian.T @ wrench)
         assert got == pytest.approx(wanted, abs=1e-9)
 
 

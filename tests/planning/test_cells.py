@@ -133,12 +133,6 @@ def test_boxes_of_a_way_through_neighbours_lie_beside_each_other(
         assert np.allclose(turns, np.where(slices.circular, np.round(turns), 0.0))
 
 
-def test_overlap_is_a_share_of_the_width() -> None:
-    slices = Slices(team_tree(), 0.25)
-    (lower, upper), *_ = slices.expanded(slices.all[1].intervals)
-    assert upper - lower == pytest.approx(1.25 * 0.5 * pi)
-
-
 # Explorations: their channels, their cheapest paths, their events, and searches by cells alone.
 
 

@@ -11,19 +11,11 @@ import shapely
 from scipy.interpolate import BSpline
 
 from coop_drake.answers import Found, PlanningResult, Undecided
-from coop_drake.answers.motion import WAITING
 from coop_drake.answers.plan import Cell
 from coop_drake.laws import ScheduledGains
 from coop_drake.planning import planner
 from coop_drake.planning.duration import plan_time, timed
-from coop_drake.planning.motion import (
-    BRAKE_RAMP,
-    MOST_SPANS,
-    cell_sets,
-    first_points,
-    first_ways,
-    quickest_motion,
-)
+from coop_drake.planning.motion import MOST_SPANS, cell_sets, first_points, first_ways, quickest_motion
 from coop_drake.planning.motion_limits import (
     base_chains,
     base_places,
@@ -147,27 +139,6 @@ def test_a_limit_that_is_too_low_is_refused_by_its_key_with_a_value_that_is_quic
     assert isinstance(ask(**{name: np.full(2, 0.5 * least)}), Undecided)
 
 
-def test_it_begins_and_ends_at_rest(case: Case) -> None:
-    ends = [0.0, case.motion.duration]
-    np.testing.assert_allclose(case.spline(ends[0]), case.plan.start, atol=1e-12)
-    np.testing.assert_allclose(case.spline(ends[1])[:3], case.plan.goal_pose, atol=1e-12)
-    np.testing.assert_allclose(case.spline(ends, 1), 0.0, atol=1e-12)
-    np.testing.assert_allclose(case.spline(ends, 2), 0.0, atol=1e-9)
-
-
-def test_it_lies_in_its_cells_which_follow_each_other(case: Case) -> None:
-    windows = case.motion.windows
-    for (begin, end), cell in zip(windows, case.plan.cells, strict=True):
-        part = case.spline(np.linspace(begin, end, 400))
-        assert (part[:, 2:] >= cell.lower).all()
-        assert (part[:, 2:] <= cell.upper).all()
-        assert shapely.covers(cell.tidied, shapely.points(part[:, :2])).all()
-    assert windows[0, 0] == 0.0
-    assert windows[-1, 1] == pytest.approx(case.motion.duration, abs=1e-12)
-    assert (np.diff(windows[:, 0]) > 0.0).all()
-    assert (windows[1:, 0] < windows[:-1, 1]).all()
-
-
 def test_all_limits_are_kept_and_used(case: Case) -> None:
     seconds = np.linspace(0.0, case.motion.duration, 20001)
     for share in (*case.used(seconds, case.spline(seconds)), case.used_of_jerk()):
@@ -177,26 +148,3 @@ def test_all_limits_are_kept_and_used(case: Case) -> None:
 def test_it_is_quicker_than_cells_that_end_at_rest(case: Case) -> None:
     at_rest = share_speeds(case.problem, timed(case.plan), ScheduledGains())
     assert case.motion.duration < 0.6 * plan_time(at_rest)
-
-
-def test_the_team_can_brake_at_any_time_before_it_leaves_the_cell_it_may_enter(case: Case) -> None:
-    """Braking at beta_i stops before x_i; and at other times with the rate that holds there."""
-    motion = case.motion
-    latest = motion.windows[:-1, 0] + WAITING
-    random = np.random.default_rng(0)
-    for index in random.permutation(len(latest))[:8]:
-        begin = latest[index - 1] if index else 0.0
-        rate = motion.rates[index]
-        for sigma in (latest[index], random.uniform(begin, latest[index])):
-            # rho' falls to -kappa within r, stays there, and rises to zero within r.
-            level = 1.0 / rate - BRAKE_RAMP
-            times = np.arange(0.0, level + 2.0 * BRAKE_RAMP, 1e-3)
-            corners = np.cumsum([0.0, BRAKE_RAMP, max(level, 0.0), BRAKE_RAMP])
-            slowing = np.interp(times, corners, [0.0, -rate, -rate, 0.0])
-            pace = 1.0 + np.append(0.0, np.cumsum(0.5 * (slowing[1:] + slowing[:-1]) * 1e-3))
-            phase = sigma + np.append(0.0, np.cumsum(0.5 * (pace[1:] + pace[:-1]) * 1e-3))
-            assert abs(pace[-1]) < 0.02
-            assert phase[-1] <= motion.windows[index, 1] + 1e-3
-            fast, hard = case.used(times, case.spline(np.minimum(phase, motion.duration)))
-            assert fast <= 1.0
-            assert hard <= 1.0 + 5e-3

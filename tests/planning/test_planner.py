@@ -24,14 +24,14 @@ from coop_drake.planning.cells.exploration import Exploration, Verdict
 from coop_drake.planning.channel import CoveredPath, NoChannel
 from coop_drake.planning.duration import plan_time
 from coop_drake.planning.planner import plan, quicker_plans
-from coop_drake.planning.proofs import MANY_CORNERS, Proofs, blocked_goal, clearance_bound, refuted_at_an_end
+from coop_drake.planning.proofs import MANY_CORNERS, Proofs, clearance_bound, refuted_at_an_end
 from coop_drake.planning.questions import relaxed
 from coop_drake.planning.rescaling import Rescaling
 from coop_drake.planning.search import find_path
 from coop_drake.tree.component_tree import Body, Component, ComponentTree, PlanarPose, TreeJoint
 from coop_drake.verification import verify_proof
 from tests.planning.test_search import rod_problem
-from tests.support.cases import case, rectangle, transport
+from tests.support.cases import rectangle, transport
 from tests.support.channels import bent_channel
 from tests.support.free_positions import FreePositions
 
@@ -287,17 +287,6 @@ def test_a_corridor_narrower_than_the_object_is_refuted_by_the_object_alone() ->
     assert proofs.run(40, 0) is Verdict.INFEASIBLE
     assert proofs.refutation is not None
     assert "the object alone" in proofs.refutation.reason
-
-
-def test_a_goal_in_collision_is_stated() -> None:
-    problem = case("base")
-    blocked = replace(problem, goal_pose=np.array([6.2, 4.5, 0.0]))
-    proof, slices = blocked_goal(blocked)
-    assert proof is not None
-    assert proof.kind == "blocked goal"
-    assert slices <= 128
-    verify_proof(proof, blocked)
-    assert blocked_goal(problem)[0] is None
 
 
 @pytest.mark.parametrize(("corridor", "bound"), [(0.21, 0.01), (0.3, 0.08), (1.0, None)])

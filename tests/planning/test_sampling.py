@@ -174,32 +174,6 @@ def middle(grid: ObstacleGrid, square: int) -> np.ndarray:
     return grid.corner + (np.array([column, row]) + 0.5) * grid.side
 
 
-@pytest.mark.parametrize("reach", [0.05, 0.7])
-@pytest.mark.parametrize("name", FLOORS)
-def test_a_square_lists_every_edge_that_comes_near_it(name: str, reach: float) -> None:
-    grid = lay_grid(polygon_rings(FLOORS[name]), reach)
-    edges = shapely.linestrings(grid.edges.reshape(-1, 2, 2))
-    squares = np.random.default_rng(3).permutation(grid.rows * grid.columns)[:150]
-    for square in squares.tolist():
-        here = middle(grid, square)
-        half = 0.5 * grid.side
-        area = box(*(here - half), *(here + half))
-        listed = grid.listed[grid.first[square] : grid.first[square + 1]]
-        away = grid.away[grid.first[square] : grid.first[square + 1]]
-        assert set(np.flatnonzero(shapely.distance(edges, area) < reach - 1e-9)) <= set(listed.tolist())
-        assert (np.diff(away) >= 0.0).all()
-        assert away == pytest.approx(shapely.distance(edges[listed], Point(here)), abs=1e-7)
-        assert len(set(listed.tolist())) == len(listed)
-
-
-@pytest.mark.parametrize("name", FLOORS)
-def test_middles_lie_inside_where_the_floor_is(name: str) -> None:
-    grid = lay_grid(polygon_rings(FLOORS[name]), 0.5)
-    middles = np.array([middle(grid, square) for square in range(grid.rows * grid.columns)])
-    assert (grid.inside == shapely.contains_xy(FLOORS[name], middles)).all()
-    assert grid.inside.any()
-
-
 @pytest.mark.parametrize("name", FLOORS)
 def test_a_point_is_as_far_from_the_walls_as_it_is_up_to_the_grid_s_reach(name: str) -> None:
     floor, reach, here = FLOORS[name], 0.3, np.zeros((1, 2))
@@ -334,14 +308,6 @@ def clearance(problem, path):
 def test_the_clearance_is_what_shapely_measures(problem, bent):
     assert path_clearance(problem, bent, 1.0) == pytest.approx(clearance(problem, bent), abs=2e-3)
     assert path_clearance(problem, bent, 0.01) == 0.01
-
-
-def test_a_start_near_a_wall_allows_clearance_elsewhere(problem):
-    path = np.array([[-2.5, 0.48, 1.5], [-2.0, 0.0, 0.0], [-1.8, 0.0, 0.0]])
-    near = replace(problem, start=path[0])
-    assert clearance(near, path) < 0.03
-    assert path_clearance(near, path, 0.15) > 0.05
-    assert path_clearance(near, np.vstack((path, path[0])), 0.15) > 0.05
 
 
 def test_a_path_is_moved_from_the_walls_and_stays_free(problem, bent):

@@ -226,7 +226,6 @@ def solids(mesh):
 
 NAMES = ("sphere", "box", "cylinder", "capsule", "ellipsoid", "convex", "mesh")
 
-
 angles = st.floats(-3.2, 3.2)
 
 
@@ -280,12 +279,9 @@ def test_flat_hull_keeps_a_thickness():
 
 ROOM = Polygon(box(0.0, 0.0, 4.0, 3.0).exterior, [box(2.0, 1.0, 2.5, 1.5).exterior.coords])
 
-
 DISC = Body("disc", 0, (ConvexShape(np.array([[0.1, 0.0]]), 0.2),))
 
-
 BAR = Body("bar", 0, (ConvexShape(np.array([[-0.5, 0.0], [0.5, 0.0]]), 0.1),))
-
 
 PAIR = Body("pair", 0, (ConvexShape(np.array([[0, 0], [1, 0], [1, 1], [0, 1.0]])), *DISC.shapes))
 

@@ -30,7 +30,6 @@ from tests.support.robot_models import Arm, urdf_arm
 
 START = "object: {x: 0.9, y: 2, theta: 1.57}"
 
-
 GOAL = "object: {x: 5, y: 8, theta: 4.663}  # joints are free"
 
 
@@ -359,7 +358,6 @@ def test_an_unknown_robot_is_refused(tmp_path):
 
 
 LONG_BLUE = "package://coop_drake_models/long_blue.sdf"
-
 
 MESH = "v 0 0 0\nv 0.1 0 0\nv 0 {y} 0\nv 0 0 0.1\nf 1 2 3\nf 1 2 4\nf 1 3 4\nf 2 3 4\n"
 

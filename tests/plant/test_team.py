@@ -114,26 +114,6 @@ def test_the_plant_has_the_coordinates_of_the_object_and_the_joints_and_torques_
     assert get_rates(team, context) == pytest.approx(np.zeros(size))
 
 
-PLANAR = [3, 4, 2]
-
-
-def moving(team, context, seed=2):
-    """A state of the team within its joints' limits; z and its rates."""
-    rng = np.random.default_rng(seed)
-    joints = [rng.uniform(j.position_lower_limits()[0], j.position_upper_limits()[0]) for j in team.joints]
-    z, z_rate = np.array([*rng.uniform(-2.0, 2.0, 3), *joints]), rng.uniform(-1.0, 1.0, 3 + len(joints))
-    set_configuration(team, context, z, z_rate)
-    return z, z_rate
-
-
-def own_state(team, robot, context, z, z_rate):
-    """(z_k, z_k') of one robot as the team's plant has them."""
-    base_rate = robot.base_body.EvalSpatialVelocityInWorld(context).get_coeffs()[PLANAR]
-    joints = slice(3 + robot.q_slice.start, 3 + robot.q_slice.stop)
-    pose = base_poses(team, context)[robot.index]
-    return np.concatenate([pose, z[joints]]), np.concatenate([base_rate, z_rate[joints]])
-
-
 def applied(team, wrenches):
     """Wrenches on the bases and on the object as Drake takes them."""
     forces = []
@@ -145,33 +125,6 @@ def applied(team, wrenches):
         force.F_Bq_W = SpatialForce(tau=[0.0, 0.0, torque], f=[fx, fy, 0.0])
         forces.append(force)
     return forces
-
-
-def test_effort_is_what_moves_the_robot_and_what_its_hand_gives_away(scenario):
-    """M z'' + C z' + J^T tau_e equals the base wrench and torques put in, with tau_e read from the weld."""
-    team, builder = team_of(scenario)
-    diagram = builder.Build()
-    root = diagram.CreateDefaultContext()
-    plant, context = team.plant, team.plant.GetMyMutableContextFromRoot(root)
-    z, z_rate = moving(team, context)
-    rng = np.random.default_rng(4)
-    wrenches = rng.uniform(-5.0, 5.0, (len(team.robots), 3))
-    torques = rng.uniform(-2.0, 2.0, len(team.joints))
-    plant.get_actuation_input_port().FixValue(context, torques)
-    forces = applied(team, [*wrenches, np.zeros(3)])
-    plant.get_applied_spatial_force_input_port().FixValue(context, forces)
-    acceleration = plant.get_generalized_acceleration_output_port().Eval(context)
-    spatial = plant.get_body_spatial_accelerations_output_port().Eval(context)
-    on_object = team.grasps.wrenches(context)
-    for robot in team.robots:
-        own = robot_dynamics(scenario, robot.index)
-        own.set_state(*own_state(team, robot, context, z, z_rate))
-        base = spatial[int(robot.base_body.index())].get_coeffs()[PLANAR]
-        joints = acceleration[[joint.velocity_start() for joint in robot.joints]]
-        reaction = own.grasp_jacobian().T @ on_object[robot.index]
-        effort = own.inertial_effort(np.concatenate([base, joints])) + reaction
-        given = np.concatenate([wrenches[robot.index], torques[robot.q_slice]])
-        assert effort == pytest.approx(given, abs=1e-5)
 
 
 CHAINS = [[REVOLUTE, PRISMATIC, REVOLUTE], [PRISMATIC], [REVOLUTE, REVOLUTE]]
@@ -250,7 +203,6 @@ def ring(tmp_path_factory):
 
 
 ARMS = [[REVOLUTE, PRISMATIC, REVOLUTE], [PRISMATIC], [REVOLUTE, REVOLUTE], []]
-
 
 GRAVITY = 0.3
 

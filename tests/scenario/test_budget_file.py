@@ -20,7 +20,6 @@ from tests.support.scenarios import write_scenario
 
 PRESET = {"preset": "mobile_base"}
 
-
 UNLIMITED = {"actuators": {"base_force": None}}
 """A budget for the position alone bounds no efforts."""
 

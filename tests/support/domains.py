@@ -26,12 +26,6 @@ def warehouse() -> tuple[Polygon, Point]:
     return box(0, 0, 8, 6).difference(shapely.union_all(shelves)), Point(7.3, 5.3)
 
 
-def long_shelves(rows: int = 6) -> tuple[Polygon, Point]:
-    """Shelves along aisles fifty times as long as wide."""
-    shelves = [box(1, 0.2 + 0.5 * k, 11, 0.5 + 0.5 * k) for k in range(rows)]
-    return box(0, 0, 12, 0.5 * rows + 0.2).difference(shapely.union_all(shelves)), Point(11.5, 0.9)
-
-
 def maze(corridors: int = 8) -> tuple[Polygon, Point]:
     """A serpentine with thin walls."""
     walls = [

@@ -57,12 +57,6 @@ class RobotDynamics(RobotPlant):
         bias = self.plant.CalcBiasSpatialAcceleration(self.context, *self._grasp_arguments)
         return bias.get_coeffs()[_PLANAR]
 
-    def grasp_pose(self) -> FloatArray:
-        """Pose (x, y, angle) of E_k in W, shape (3,) [m, rad]."""
-        X_WE = self.gripper_frame.CalcPoseInWorld(self.context)
-        R, p = X_WE.rotation().matrix(), X_WE.translation()
-        return np.array([p[0], p[1], np.arctan2(R[1, 0], R[0, 0])])
-
 
 def robot_dynamics(scenario: Scenario, k: int) -> RobotDynamics:
     """The model that robot k has of itself."""

@@ -8,9 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Diagram, DiagramBuilder, LeafSystem
-from pydrake.systems.primitives import FirstOrderLowPassFilter, ZeroOrderHold
 
 from benchmarks.one_process import DirectExchange
 from coop_drake import systems
@@ -21,7 +19,6 @@ from coop_drake.laws.departures import CREEP_SPEED, act_on_wrenches, without_dep
 from coop_drake.plant import (
     base_poses,
     build_robot_plant,
-    build_separate_team,
     build_team_plant,
     set_configuration,
 )
@@ -285,78 +282,6 @@ def test_every_robot_finds_the_objects_state_from_its_own_motion(rig):
         known = evaluate(system, inputs, "object_state")
         np.testing.assert_array_equal(known[:3], rig.z[:3])
         np.testing.assert_allclose(known[3:], rig.rates[:3], atol=1e-13)
-
-
-@pytest.fixture(scope="module", params=["base", "elbow"])
-def teams(request):
-    """The same team in both plants, in the same configuration, and each plant's state."""
-    scenario = small_scenario(request.param)
-    built = [build(scenario, DiagramBuilder()) for build in (build_separate_team, build_team_plant)]
-    rng = np.random.default_rng(3)
-    z, rates = rng.uniform(-0.7, 0.7, (2, 3 + len(built[0].joints)))
-    states = []
-    for team in built:
-        context = team.plant.CreateDefaultContext()
-        set_configuration(team, context, z, rates)
-        states.append(team.plant.GetPositionsAndVelocities(context))
-    return list(zip(built, states, strict=True))
-
-
-def test_the_same_is_measured_in_both_plants(teams):
-    (separate, state), (tree, tree_state) = teams
-    sensor, of_tree = systems.build_separate_sensor(separate), systems.TeamSensor(tree)
-    values = evaluate(of_tree, {"team_state": tree_state}, "measurements")
-    expected = np.split(values, np.cumsum(of_tree.sizes)[:-1])
-    names = ["object_pose", *(f"robot_{robot.index}_state" for robot in separate.robots)]
-    assert port_sizes(sensor) == (
-        {"team_state": separate.plant.num_multibody_states()},
-        dict(zip(names, of_tree.sizes, strict=True)),
-    )
-    for name, value in zip(names, expected, strict=True):
-        np.testing.assert_allclose(evaluate(sensor, {"team_state": state}, name), value, atol=1e-12)
-
-
-LAG, PERIOD = 0.03, 0.02
-
-
-class Wanted(LeafSystem):
-    """Asks for efforts that change all the time."""
-
-    def __init__(self):
-        super().__init__()
-        self.DeclareVectorOutputPort("wanted", 2, self._write)
-
-    def _write(self, context, output):
-        output.SetFromVector([3.0 + context.get_time(), np.sin(40.0 * context.get_time())])
-
-
-def simulated(offset):
-    """Efforts of the block and of Drake's filter, integrated in short steps, at some times."""
-    builder = DiagramBuilder()
-    hold = builder.AddSystem(ZeroOrderHold(PERIOD, 2, offset))
-    builder.Connect(builder.AddSystem(Wanted()).get_output_port(), hold.get_input_port())
-    blocks = [
-        builder.AddSystem(block)
-        for block in (systems.LaggingEffort(2, LAG, PERIOD, offset), FirstOrderLowPassFilter(LAG, 2))
-    ]
-    for block in blocks:
-        builder.Connect(hold.get_output_port(), block.get_input_port())
-    simulator = Simulator(builder.Build())
-    simulator.get_mutable_integrator().set_target_accuracy(1e-9)
-    given = []
-    for time in (0.0, 0.005, 0.02, 0.033, 0.1, 0.1101, 0.2):
-        simulator.AdvanceTo(time)
-        root = simulator.get_context()
-        given.append([block.get_output_port().Eval(block.GetMyContextFromRoot(root)) for block in blocks])
-    return np.array(given).transpose(1, 0, 2)
-
-
-@pytest.mark.parametrize("offset", [0.0, 0.007])
-def test_efforts_are_those_of_a_low_pass_behind_a_hold(offset):
-    own, drakes = simulated(offset)
-    np.testing.assert_array_equal(own[0], 0.0)
-    np.testing.assert_allclose(own, drakes, rtol=1e-6, atol=1e-9)
-    assert own[-1, 0] > 2.9
 
 
 @pytest.mark.parametrize(

@@ -60,7 +60,6 @@ def test_outputs_are_the_law_of_the_current_cell(cells, index):
 
 PLAN = small_plan(("a", "b", "c"))
 
-
 AXES = [0, 2, 3]
 
 

@@ -16,7 +16,6 @@ from tests.support.system_checks import context_with, evaluate, port_sizes
 
 PERIOD = 0.1
 
-
 NEVER = [-1.0, -1.0]
 
 

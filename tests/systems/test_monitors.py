@@ -23,7 +23,6 @@ from tests.support.system_checks import context_with, evaluate, port_sizes
 
 PLAN = stiffer_and_stiffer(small_plan(("a", "b", "c")))
 
-
 AXES = [0, 2, 3]
 
 
@@ -104,7 +103,6 @@ def cells():
 
 
 PERIOD, CELLS = 0.01, 3
-
 
 ARRIVAL = ArrivalGoal(np.array([3.0, 2.0, 0.5, 0.1]), np.array([0.01, 0.02, np.inf]), np.zeros(3))
 

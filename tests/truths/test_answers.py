@@ -28,7 +28,7 @@ from coop_drake.planning.search import find_channel
 from coop_drake.plant.chain import planar_pose
 from coop_drake.tree import component_tree
 from coop_drake.verification.answer import same_angle
-from tests.support.cases import case, team_tree
+from tests.support.cases import case
 from tests.support.free_positions import FreePositions, wall_edges
 from tests.support.moved import Similarity
 from tests.support.passages import DiscDoor, FoldingArm, LadderCorner, RodCorridor
@@ -125,45 +125,6 @@ def test_every_part_takes_angles_apart_by_whole_turns_for_one(angle: float, turn
     assert component_tree.nearest_turn(turned - angle) == pytest.approx(0.0, abs=1e-12)
     assert same_angle(
         planar_pose(RigidTransform(RotationMatrix.MakeZRotation(turned), np.zeros(3))).angle, angle
-    )
-
-
-@settings(max_examples=20)
-@given(SIMILARITIES, st.booleans())
-def test_a_moved_team_stands_where_its_image_stands(similarity: Similarity, sliding: bool) -> None:
-    """The images of all corners are the corners of the image: that the question is moved as it should be."""
-    problem = FoldingArm().problem(0.4)
-    tree = team_tree(2, 2)
-    if sliding:
-        components = tuple(
-            component if component.joint is None else replace(component, joint=_sliding(component.joint))
-            for component in tree.components
-        )
-        tree = replace(tree, components=components)
-    z = np.array([1.0, 2.0, 0.5, 0.1, -0.2, 0.3, 0.4])
-    problem = replace(problem, tree=tree, start=z, goal_pose=z[:3], goal_joints=(None,) * 4)
-    image = similarity.question(problem)
-    corner = _corners(problem) * np.array([1.0, similarity.sign]) * similarity.scale
-    c, s = np.cos(similarity.angle), np.sin(similarity.angle)
-    expected = corner @ np.array([[c, s], [-s, c]]) + similarity.shift
-    found = _corners(image)
-    gaps = np.abs(expected[:, None, :] - found[None, :, :]).max(axis=2)
-    assert max(gaps.min(axis=0).max(), gaps.min(axis=1).max()) < 1e-9 * (1e4 + similarity.scale)
-
-
-def _sliding(joint: component_tree.TreeJoint) -> component_tree.TreeJoint:
-    return replace(joint, kind="prismatic", axis=(0.6, 0.8))
-
-
-def _corners(problem: PlanningProblem) -> np.ndarray:
-    poses = problem.tree.poses(problem.start)
-    return np.concatenate(
-        [
-            X_WC.apply(shape.vertices)
-            for X_WC, component in zip(poses, problem.tree.components, strict=True)
-            for body in component.bodies
-            for shape in body.shapes
-        ]
     )
 
 

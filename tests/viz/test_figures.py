@@ -222,16 +222,6 @@ def test_every_joint_of_a_robot_has_its_own_axes_in_its_unit(changed, unit):
     assert [axes.get_ylabel() for axes in figure.axes] == ["joint_1 [rad]", f"joint_2 [{unit}]"]
 
 
-def test_the_angle_of_a_team_that_passes_is_in_an_interval_of_its_cell_and_no_funnel():
-    log = synthetic_log(case("base"))
-    passed = replace(log, phases=np.zeros((len(log.times), 2, 3)))
-    words = [
-        [text.get_text() for text in angle_figure(each).axes[0].get_legend().get_texts()]
-        for each in (log, passed)
-    ]
-    assert words == [["funnel", "θ"], ["interval", "θ"]]
-
-
 BEFORE = dict.fromkeys(CRITERIA, 1.0) | {"time": 20.0, "peak_force": 200.0}
 
 

@@ -143,7 +143,6 @@ PROCESSES = [
 
 STOP = {"cause": "robot 1", "since": 2.5, "rested": None, "resumed": None}
 
-
 FACTS = {"processes": PROCESSES, "stops": [STOP | {"resumed": 3.0}, STOP]}
 
 
@@ -218,32 +217,12 @@ def test_a_browser_gets_the_recording_before_the_server_ends(served, tmp_path):
     browser.join()
 
 
-@pytest.fixture
-def logged():
-    records = []
-
-    class Collector(logging.Handler):
-        def emit(self, record):
-            records.append(record.getMessage())
-
-    logger, collector = logging.getLogger("drake"), Collector()
-    level = logger.level
-    logger.addHandler(collector)
-    logger.setLevel(logging.INFO)
-    yield records
-    logger.setLevel(level)
-    logger.removeHandler(collector)
-
-
-def test_a_server_that_is_started_says_nothing(logged):
+def test_a_server_that_is_started_says_nothing_and_others_that_are_started_later_do(caplog):
+    caplog.set_level(logging.INFO, "drake")
     assert silent_meshcat().web_url().startswith("http://localhost:")
-    assert logged == []
-
-
-def test_others_that_are_started_later_do_so_again(logged):
-    silent_meshcat()
+    assert caplog.messages == []
     Meshcat()
-    assert [line.partition(" at ")[0] for line in logged] == ["Meshcat listening for connections"]
+    assert [line.partition(" at ")[0] for line in caplog.messages] == ["Meshcat listening for connections"]
 
 
 def test_only_browsers_on_this_machine_reach_it():
@@ -408,7 +387,6 @@ def test_the_page_says_how_it_ended(end, words):
 # Obstacles on the floor and the colours of robots.
 
 FLOOR = box(0, 0, 6, 5)
-
 
 SHELF, PILLAR = Polygon([(1, 1), (3, 1.5), (2.9, 1.9), (0.9, 1.4)]), box(4, 3, 4.4, 3.3)
 
