@@ -9,7 +9,7 @@ import pytest
 from coop_drake.laws import FixedGains, ScheduledGains
 from coop_drake.plant.model_writing import polygon_body_files, write_polygon_body
 from coop_drake.scenario import load_scenario
-from coop_drake.simulation import build_maps, communication, simulate
+from coop_drake.simulation import build_maps, simulate
 from tests.support.edited_scenario import write_edited, write_with_robot
 from tests.support.hand_over import assert_certified
 from tests.support.random_plan import random_plan
@@ -125,22 +125,6 @@ def test_cells_are_walked_one_by_one_and_every_switch_is_certified(run):
         axes = np.concatenate([log.object_pose[row, 2:], log.joints[row]])
         assert np.all((transition.goal_lower < axes) & (axes < transition.goal_upper))
     assert_certified(plan, log)
-
-
-def test_robots_say_little_and_all_of_it_counts(run):
-    _, _, plan, log = run
-    statistics, robots = communication(log), len(log.robot_names)
-    assert all(count >= len(plan.cells) for count in statistics.reports)
-    assert statistics.announcements == robots * (len(plan.cells) - 1)
-    assert statistics.messages < 10 * robots * len(plan.cells)
-
-
-def test_funnels_start_on_the_slice_and_hold_the_axes(run):
-    _, _, plan, log = run
-    axes = np.hstack([log.object_pose[:, 2:], log.joints])
-    assert np.all((log.funnel_lower < axes) & (axes < log.funnel_upper))
-    np.testing.assert_allclose(log.funnel_lower[0], plan.cells[0].lower, atol=1e-12)
-    np.testing.assert_allclose(log.funnel_upper[0], plan.cells[0].upper, atol=1e-12)
 
 
 def test_logs_are_verified(run):

@@ -37,6 +37,8 @@ from coop_drake.scenario.model import RobotLimits, Tolerances
 from coop_drake.simulation import build_maps, simulate
 from coop_drake.systems.words import SAID, RobotWords
 from coop_drake.verification.motion import _movers
+from coop_drake.verification.runs.motion import check_followed
+from coop_drake.verification.runs.rows import Rows
 from coop_drake.verification.runs.verify_log import verify_log
 from tests.support.motions import passing, planned_motion
 from tests.support.small_loop import small_maps, small_problem
@@ -121,6 +123,30 @@ def test_its_log_is_verified_and_an_altered_one_refused(transport: Transport) ->
         with pytest.raises(RefusalError) as refusal:
             verify_log(replace(log, **{name: changed}), plan, problem, setup)
         assert refusal.value.where.startswith(where)
+
+
+def test_a_run_off_its_motion_is_refused(transport: Transport) -> None:
+    """The log is whole in itself, but of another motion: later, or pulled to with other gains."""
+    _, problem, plan, log = transport
+    motion = plan.motion
+    assert motion is not None
+    rows = Rows(log, plan)
+    assert len(check_followed(rows, problem, exact=True)) == 8
+    for changes, where in (
+        ({"period": 1.001 * motion.period}, "phases"),
+        ({"windows": motion.windows + np.array([0.05, 0.0])}, "cell_index"),
+        ({"points": motion.points + 1e-5 * np.eye(motion.points.shape[1])[-1]}, "accelerations"),
+    ):
+        other = replace(plan, motion=replace(motion, **changes))
+        with pytest.raises(RefusalError) as refusal:
+            check_followed(Rows(log, other), problem, exact=True)
+        assert refusal.value.where.startswith(where)
+
+
+def test_a_run_that_is_given_too_little_time_says_from_which_phase_the_motion_goes_on(transport: Transport):
+    scenario, _, plan, _ = transport
+    brief = replace(scenario, simulator=replace(scenario.simulator, max_time=1.0))
+    assert "the motion goes on from the phase" in simulate(brief, plan, build_maps(plan)).violation
 
 
 class Alarmed(RobotWords):

@@ -14,6 +14,7 @@ from coop_drake.diagnosis import diagnosing as relaxations
 from coop_drake.diagnosis.contacts import colliding_stretches, contacts, narrowest_gap, overlaps
 from coop_drake.diagnosis.diagnosing import SLICES, changes, find_passages, try_changes
 from coop_drake.diagnosis.variants import BudgetedPlanner, WidenedFloor, on_open_floor
+from coop_drake.drawing import save_figure
 from coop_drake.planning import Channel, find_channel
 from coop_drake.tree.component_tree import Body, Component, ComponentTree, PlanarPose, TreeJoint
 from tests.support.cases import case, disc, rectangle, team_tree
@@ -179,6 +180,12 @@ def test_an_undecided_question_says_what_remained_mixed(monkeypatch):
     assert "neither free nor blocked" in said
     assert "planner.max_slices" in said
     assert facts_of(diagnosis)["mixed"][0]["share_of_axis"] == diagnosis.mixed[0].width_fraction
+
+
+def test_the_same_diagnosis_has_the_same_picture(rod, tmp_path):
+    for number in range(2):
+        save_figure(diagnosis_figure(*rod), tmp_path / f"{number}.svg")
+    assert (tmp_path / "0.svg").read_bytes() == (tmp_path / "1.svg").read_bytes()
 
 
 def test_an_interrupt_comes_through():

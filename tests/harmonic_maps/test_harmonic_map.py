@@ -54,6 +54,7 @@ NAMED = {
     "two_rooms": domains.two_rooms(0.01),
     "bevelled": domains.bevelled(1e-3),
     "rounded_room": domains.rounded_room(),
+    "round_shelves": (domains.warehouse()[0].buffer(-0.15, quad_segs=3), Point(7.3, 5.3)),
     "maze": domains.maze(5),
 }
 

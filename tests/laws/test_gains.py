@@ -227,6 +227,8 @@ def test_defaults_of_the_fixed_set_are_table_2():
 def test_bad_gains_are_refused_by_name():
     with pytest.raises(ValueError, match=r"^energy_factor: 0\.9 .* a number of at least 1$"):
         laws.ScheduledGains(energy_factor=0.9)
+    with pytest.raises(ValueError, match=r"^smoothing: -0\.001 .* expected zero or a positive number$"):
+        laws.ScheduledGains(smoothing=-0.001)
     with pytest.raises(ValueError, match=r"^funnel: 'cubic' .* one of exponential, quintic$"):
         laws.FixedGains(funnel="cubic")
 

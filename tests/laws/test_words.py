@@ -433,16 +433,6 @@ def test_the_common_brake_stops_all_at_once_and_a_new_start_ends_it():
     team.until(arrived)
 
 
-def test_a_robot_that_brakes_passes_on_a_hold_before_its_own():
-    team = Team(even_schedule(6), [0.0] * 2)
-    team.until(lambda team: team.time > 1.5)
-    team.wanted = False
-    team.until(all_are(w.BRAKE))
-    team.words[0, 1, w.HOLD] = 0.9 * team.words[0, 0, w.HOLD]
-    team.step()
-    assert team.words[0, 0, w.HOLD] == team.words[0, 1, w.HOLD]
-
-
 @pytest.mark.parametrize(("wrong", "holds"), [(1.9, False), (6.0, True)])
 def test_a_stamp_that_clocks_do_not_allow_asks_for_a_hold(wrong, holds):
     schedule = even_schedule(6)

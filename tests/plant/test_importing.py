@@ -308,6 +308,10 @@ BROKEN = [
     ("<sdf version='1.9'/>", "must have a single <model>"),
     ('<!DOCTYPE sdf [<!ENTITY a "b">]>' + ARM, "the entity a is declared"),
     (Arm(extra="<blah/>").text(), "not defined in SDF"),
+    ("<robot name='arm'/>", "<robot> is the root; a .sdf file has <sdf>"),
+    (Arm(extra=200 * "<a>" + 200 * "</a>").text(), "more than 100 elements inside each other"),
+    (exchanged(ARM, ("<mass>6.0", "<mass>heavy")), "'heavy' in <mass> is no finite number"),
+    (exchanged(ARM, ("<pose>0.3 0 0.4 0 0 0", "<pose>0.3 0")), "<pose> has 2 numbers, not 6"),
     (exchanged(ARM, ("<mass>6.0", "<mass>-6")), "central inertia"),
     (exchanged(ARM, ("<izz>0.6", "<izz>9")), "triangle inequality"),
     (exchanged(ARM, ("<radius>0.2", "<radius>-0.2")), REPLACED),
@@ -381,6 +385,7 @@ COUPLED = urdf_arm(mimic="<mimic joint='reach' multiplier='2'/>")
         (urdf_arm("floating"), "robot_0::base, robot_0::boom", "one body that no joint leads to"),
         (COUPLED, "constraints in the models", "joints that are not coupled to one another"),
         (urdf_arm()[:-30], "other.urdf", "unclosed token"),
+        (exchanged(urdf_arm(), ("<origin xyz", "<orign xyz")), "other.urdf", "origin is meant?"),
     ],
 )
 def test_urdf_robots_are_refused_alike(text, value, allowed, tmp_path):
