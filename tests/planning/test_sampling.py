@@ -34,7 +34,6 @@ from coop_drake.planning.sampling.band import (
 from coop_drake.planning.sampling.collision import (
     ALL,
     FAR,
-    ObstacleGrid,
     grid_for_team,
     grid_inside,
     is_free,
@@ -166,12 +165,6 @@ FLOORS = {
     "two": MultiPolygon([box(0, 0, 2, 1), Polygon(box(3, 0, 6, 3).exterior, [box(4, 1, 5, 2).exterior])]),
     "far away": shapely.transform(room(), lambda points: points + np.array([1e4, -2e4])),
 }
-
-
-def middle(grid: ObstacleGrid, square: int) -> np.ndarray:
-    """Middle of a square."""
-    column, row = divmod(square, grid.rows)
-    return grid.corner + (np.array([column, row]) + 0.5) * grid.side
 
 
 @pytest.mark.parametrize("name", FLOORS)
