@@ -239,6 +239,10 @@ def test_a_slice_is_blocked_where_two_pieces_overlap_in_all_of_it():
     assert "do not tile" in refused(question, short)
 
 
+def test_tolerances_are_not_negative():
+    assert "question.tolerances: are negative" in refused(QUESTION | {"tolerances": [-0.01, 0.02]}, PROOF)
+
+
 def test_it_runs_in_an_empty_python_on_two_files(tmp_path):
     (tmp_path / "question.json").write_text(json.dumps(QUESTION))
     (tmp_path / "answer.json").write_text(json.dumps(PROOF))

@@ -2,7 +2,7 @@
 
 from fractions import Fraction
 from itertools import pairwise
-from math import cos, isqrt, sin
+from math import cos, inf, isqrt, nan, sin
 
 import pytest
 from hypothesis import assume, given, settings
@@ -63,6 +63,12 @@ def test_a_turn_is_two_pi():
 def test_numbers_are_doubles_to_a_multiple_of_a_unit(value):
     (exact,) = numbers([value], 1)
     assert abs(Fraction(exact, 1 << BITS) - Fraction(value)) <= Fraction(1, 2 << BITS)
+
+
+@pytest.mark.parametrize("value", [nan, inf, 1e25, 10**400, True, None, "1", [], {}])
+def test_what_is_no_number_of_metres_or_radians_is_refused(value):
+    with pytest.raises(RefusedError, match="are not 1 between"):
+        numbers([value], 1)
 
 
 @given(PLACES, PLACES)
