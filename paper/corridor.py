@@ -23,8 +23,8 @@ from paper.table_1 import ANGLE_TOLERANCE, CORRECTED, GOAL_ANGLE, START
 
 __all__ = ["corridor_plan", "corridor_scenario"]
 
-_STEP, _HALF, _MARGIN, _BORDER = 0.3, 0.5, 0.05, 4.0
-"""Distance of neighbouring cells, half a cell's side, inset of its core, and border of the hall [m]."""
+_STEP, _HALF, _BORDER = 0.3, 0.5, 4.0
+"""Distance of neighbouring cells, half a cell's side, and border of the hall [m]."""
 
 
 def corridor_scenario(scenario: Scenario) -> Scenario:
@@ -65,9 +65,9 @@ def corridor_plan(problem: PlanningProblem, gain_set: GainSet, name: str) -> Pla
     for index, row in enumerate(CORRECTED):
         x = _STEP * index
         polygon = box(x - _HALF, -_HALF, x + _HALF, _HALF)
-        boxes.append(FreeBox(polygon, polygon.buffer(-_MARGIN), row[0::2].copy(), row[1::2].copy()))
+        boxes.append(FreeBox(polygon, row[0::2].copy(), row[1::2].copy()))
     targets = [np.array([_STEP * index, 0.0]) for index in range(1, len(boxes))]
-    channel = Channel(tuple(boxes), _MARGIN, GOAL_ANGLE)
+    channel = Channel(tuple(boxes), GOAL_ANGLE)
     return make_plan(
         problem, channel, gain_set, gain_set_name=name, targets=[*targets, problem.goal_pose[:2]]
     )

@@ -17,11 +17,11 @@ from coop_drake.answers import PlanningProblem
 from coop_drake.diagnosis.contacts import CollidingStretch, colliding_stretches
 from coop_drake.errors import GeometryError, PlanError
 from coop_drake.geometry.polygons import parts_of
-from coop_drake.planning.boxes import Certifier
+from coop_drake.planning.boxes import free_boxes
 from coop_drake.planning.cells.exploration import Verdict
 from coop_drake.planning.channel import ended, make_channel
 from coop_drake.planning.proofs import Proofs
-from coop_drake.planning.questions import exact_footprint, marginal_workspace
+from coop_drake.planning.questions import exact_footprint
 from coop_drake.planning.sampled_search import SampledSearch
 from coop_drake.planning.sampling.collision import densified
 from coop_drake.planning.transitions import path_through
@@ -35,7 +35,7 @@ from coop_drake.tree.component_tree import configuration_scale
 
 
 def is_free(problem: PlanningProblem, path: FloatArray) -> tuple[bool, int]:
-    """Try to prove a path free at margin zero, by covering it with free boxes.
+    """Try to prove a path free, by covering it with free boxes.
 
     The path, circular axes unwrapped, has shape (m, 3 + n) [m, rad].
 
@@ -44,13 +44,9 @@ def is_free(problem: PlanningProblem, path: FloatArray) -> tuple[bool, int]:
     """
     if not problem.workspace.contains(exact_footprint(problem.tree, path[0])):
         return False, 0  # Boxes show that a path meets no wall, but not on which side of it the path begins.
-    try:
-        workspace, scale = marginal_workspace(problem, 0.0), configuration_scale(problem.tree)
-        certifier = Certifier(problem.tree, workspace, scale, 0.0)
-        proved = certifier.boxes(path, longest=True, smallest=True) is not None
-    except GeometryError:
-        return False, 0
-    return proved, certifier.trials
+    tree, floor = problem.tree, problem.workspace
+    boxes, tried = free_boxes(tree, floor, configuration_scale(tree), path, smallest=True)
+    return boxes is not None, tried
 
 
 # Variants of the problem, put to the planner within a budget of work; each has one of three answers.
@@ -127,7 +123,7 @@ class BudgetedPlanner:
         if verdict is not Verdict.FOUND:
             return Outcome(Answer.UNDECIDED)
         try:
-            channel = make_channel(variant, proofs.boxes(), 0.0, None)
+            channel = make_channel(variant, proofs.boxes(), None)
             path = path_through(ended(variant, channel), channel)
         except (GeometryError, PlanError):  # A cell with a cusp: the channel is proved free all the same.
             return Outcome(Answer.FOUND)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from math import hypot
 from typing import NamedTuple
 
@@ -13,7 +13,6 @@ from coop_drake.geometry.polygons import separated
 from coop_drake.geometry.sweeps import TOUCH, disc_turn, grown, over_joint
 from coop_drake.jit import compiled
 from coop_drake.planning.cells.cells import FreeBox
-from coop_drake.planning.duration import SETTLING_TIME, SPEED_PER_CLEARANCE
 from coop_drake.planning.sampling.collision import ObstacleGrid, densified, grid_inside, ring_clearance
 from coop_drake.tree.arrays import FloatArray, IntArray
 from coop_drake.tree.component_tree import ComponentTree, TeamArrays
@@ -174,7 +173,7 @@ _STEP_FRACTION = 0.5
 
 
 @compiled
-def box_clearance(
+def box_is_free(
     boxes: BoxArrays,
     grid: ObstacleGrid,
     lower: FloatArray,
@@ -183,11 +182,11 @@ def box_clearance(
     start: int,
     end: int,
     enough: float,
-) -> float:
-    """Least distance of the swept team from the obstacles while its position follows a part of a path.
+) -> bool:
+    """Whether a box is free while the position follows a part of a path: no wall is met, no bodies touch.
 
-    The path is walked in steps shorter than the distance found at each place, so that everything within half
-    of that distance is proved free, too.
+    The path is walked in steps shorter than the distance from the walls at each place, so that everything
+    within half of that distance is proved free, too.
 
     Args:
         boxes: The team.
@@ -197,10 +196,8 @@ def box_clearance(
         path: Configurations or positions p_WL, joined by straight lines, shape (m, 2 or more) [m].
         start: First row of the part.
         end: Its last row.
-        enough: Distance that is needed at the first and at the last position; half of it in between [m].
-
-    Returns:
-        The distance [m]; -1 if it falls short or bodies may touch.
+        enough: Distance from the walls that is needed at the first and at the last position; half of it in
+            between [m].
     """
     count = len(boxes.team.radii)
     vertices, first = np.empty((32 * count, 2)), np.zeros(count + 1, np.int64)
@@ -219,10 +216,10 @@ def box_clearance(
                 )
                 <= enough
             ):
-                return -1.0
+                return False
     if not sweeps_apart(boxes, sweeps, swept):
-        return -1.0
-    least, passed = np.inf, 0.0
+        return False
+    passed = 0.0
     for at in range(start, end + 1):
         dx, dy, length = 0.0, 0.0, 0.0
         if at < end:
@@ -239,11 +236,10 @@ def box_clearance(
                     grid, vertices, first[k], first[k + 1], 0.0, discs[k], x, y, 1.0, 0.0, here
                 )
                 if here <= 0.5 * enough:
-                    return -1.0
-            least = min(least, here)
+                    return False
             passed += _STEP_FRACTION * here
         passed -= length
-    return least
+    return True
 
 
 @compiled
@@ -260,7 +256,7 @@ def clearances_in_box(
     """Distance of the swept team from the obstacles at some rows of a path.
 
     Args:
-        boxes: With the next six as in ``box_clearance``.
+        boxes: With the next six as in ``box_is_free``.
         grid: The floor.
         lower: Lower ends of (theta, q...), shape (1 + n,) [rad, m].
         upper: Upper ends, shape (1 + n,).
@@ -324,58 +320,39 @@ def longest_box(
     guess: int,
     pad: float,
     clearance: float,
-    margin: float,
-) -> tuple[int, int, int]:
+) -> tuple[int, int]:
     """Find about how far along a path one free box reaches: longer ones by half, then bisection.
 
     Args:
         boxes: The team.
-        grid: The floor, from which the margin has been taken off.
+        grid: The floor.
         samples: The path, shape (m, 3 + n).
         first: Sample that the box begins with.
         guess: Sample after the first one at which the first box that is tried ends; about where it ends.
         pad: Padding of the intervals, see ``padded``.
         clearance: Distance from the obstacles that is needed at both ends [m].
-        margin: Clearance that positions have beyond that floor [m].
 
     Returns:
-        The last sample of the box that is passed quickest (``first`` if there is none), that of the longest
-        one, and the number of boxes tried.
+        The last sample of the longest box, ``first`` if there is none, and the number of boxes tried.
     """
     last = len(samples) - 1
-    best, failed, reach = first, last + 1, guess
-    quickest, fastest, trials = first, 0.0, 0
-    length, measured = 0.0, first
+    best, failed, reach, trials = first, last + 1, guess, 0
     while failed - best > max(1, int(COARSENESS * (best - first))):
         j = min(best + reach, last) if failed > last else (best + failed) // 2
         lower, upper = padded(boxes, samples, first, j, pad)
         trials += 1
-        found = box_clearance(boxes, grid, lower, upper, samples, first, j, clearance)
-        if found < 0.0:
+        if box_is_free(boxes, grid, lower, upper, samples, first, j, clearance):
+            best, reach = j, max(1, int(_GROWTH * (j - first)))
+        else:
             failed = j
-            continue
-        best, reach = j, max(1, int(_GROWTH * (j - first)))
-        while measured < j:
-            dx, dy = (
-                samples[measured + 1, 0] - samples[measured, 0],
-                samples[measured + 1, 1] - samples[measured, 1],
-            )
-            length += hypot(dx, dy)
-            measured += 1
-        pace = (j - first) / (SETTLING_TIME + length / (SPEED_PER_CLEARANCE * max(margin + found, 1e-3)))
-        if pace > fastest:
-            quickest, fastest = j, pace
-    return quickest, best, trials
+    return best, trials
 
 
 # Cover a path with boxes that are proved free by over-sweeps; consecutive boxes overlap.
 
-LEVELS = ((0.06, 0.02), (0.03, 0.01), (0.015, 0.004), (0.004, 0.001), (0.001, 0.0003))
-"""Padding of a box in every angle and joint [rad or m], and clearance that it needs at both ends [m]; the
-widest comes first, because wide boxes are crossed faster."""
-
-FIRST_LEVELS = LEVELS[2:]
-"""The levels with which the longest boxes are laid: without wide paddings each holds more of the path."""
+LEVELS = ((0.015, 0.004), (0.004, 0.001), (0.001, 0.0003))
+"""Padding of a box in every angle and joint [rad or m], and clearance that it needs at both ends [m]: with
+wider paddings boxes would hold less of the path."""
 
 SMALLEST_LEVELS = (*LEVELS, (0.0003, 0.0001), (0.00003, 0.00001))
 """``LEVELS`` and further levels, for passages of a tenth of a millimetre [rad or m, m]."""
@@ -393,95 +370,51 @@ FIRST_REACH = 4
 """Samples in the first box that is tried, before the length of any box is known."""
 
 
-class Certifier:
-    """Covers paths with boxes in one workspace.
+def free_boxes(
+    tree: ComponentTree,
+    workspace: Polygon | MultiPolygon,
+    scale: FloatArray,
+    path: FloatArray,
+    *,
+    smallest: bool = False,
+) -> tuple[list[FreeBox] | None, int]:
+    """Cover a path with boxes, from its first to its last configuration.
 
     Every box is proved free: its over-swept footprint touches no wall along the path, and no bodies touch.
     Consecutive boxes share a sample of the path, padded in every angle. Where no box holds two consecutive
-    samples, the path is sampled more closely.
+    samples, the path is sampled more closely. Levels wider than that of the box before by more than one are
+    not tried: they would fail in narrow passages again and again.
 
     Args:
         tree: The team.
-        workspace: Where the team may be; the margin is already taken off [m].
+        workspace: Where the team may be [m].
         scale: How far a unit of each axis of z moves the team, shape (3 + n,).
-        margin: Clearance that the boxes' positions have beyond that [m].
+        path: Configurations with circular axes unwrapped, the first one free, shape (m, 3 + n).
+        smallest: Whether boxes may be as small as a passage of a millimetre needs; a transport through them
+            takes long.
 
-    Attributes:
-        trials: Boxes tried so far.
+    Returns:
+        The boxes, or None if a part of the path cannot be covered, and how many boxes were tried.
     """
-
-    def __init__(
-        self,
-        tree: ComponentTree,
-        workspace: Polygon | MultiPolygon,
-        scale: FloatArray,
-        margin: float,
-    ) -> None:
-        self._boxes = box_arrays(tree)
-        self._grid: ObstacleGrid = grid_inside(workspace, tree.reach)
-        self._scale, self._margin = scale, margin
-        self._reach, self._level = FIRST_REACH, 0
-        self.trials = 0
-
-    def boxes(
-        self,
-        path: FloatArray,
-        progress: Callable[[float], None] | None = None,
-        *,
-        longest: bool = False,
-        smallest: bool = False,
-    ) -> list[FreeBox] | None:
-        """Cover a path with boxes, from its first to its last configuration.
-
-        Args:
-            path: Configurations with circular axes unwrapped, the first one free, shape (m, 3 + n).
-            progress: Called with the fraction of the path that is covered.
-            longest: Whether to take the longest boxes, instead of those with the highest average speed.
-            smallest: Whether boxes may be as small as a passage of a millimetre needs; a transport through
-                them takes long.
-
-        Returns:
-            The boxes, or None if a part of the path cannot be covered.
-        """
-        levels = SMALLEST_LEVELS if smallest else FIRST_LEVELS if longest else LEVELS
-        finest = SMALLEST_SPACING if smallest else FINEST_SPACING
-        samples = densified(path, self._scale, SPACING)
-        boxes: list[FreeBox] = []
-        i, self._level = 0, 0
-        while i < len(samples) - 1:
-            found = self._next_box(samples, i, longest, levels)
-            if found is None:
-                if np.abs((samples[i + 1] - samples[i]) * self._scale).max() < finest:
-                    return None
-                samples = _finer(samples, i)
-                continue
-            i, box = found
-            boxes.append(box)
-            if progress is not None:
-                progress(i / (len(samples) - 1))
-        return boxes
-
-    def _next_box(
-        self, samples: FloatArray, i: int, longest: bool, levels: tuple[tuple[float, float], ...]
-    ) -> tuple[int, FreeBox] | None:
-        """The box that begins at sample i, and the sample at which it ends; None if there is none.
-
-        Levels wider than that of the box before by more than one are not tried: they would fail in narrow
-        passages again and again.
-        """
-        for level in range(max(self._level - 1, 0), len(levels)):
+    levels, finest = (SMALLEST_LEVELS, SMALLEST_SPACING) if smallest else (LEVELS, FINEST_SPACING)
+    arrays, grid = box_arrays(tree), grid_inside(workspace, tree.reach)
+    samples, found = densified(path, scale, SPACING), list[FreeBox]()
+    i, reach, widest, trials = 0, FIRST_REACH, 0, 0
+    while i < len(samples) - 1:
+        for level in range(max(widest - 1, 0), len(levels)):
             pad, clearance = levels[level]
-            fastest, furthest, trials = longest_box(
-                self._boxes, self._grid, samples, i, self._reach, pad, clearance, self._margin
-            )
-            self.trials += trials
-            self._reach = max(1, furthest - i)
-            j = furthest if longest else fastest
-            if j > i:
-                self._level = level
-                lower, upper = padded(self._boxes, samples, i, j, pad)
-                return j, FreeBox(Polygon(), Polygon(), lower, upper, samples[i : j + 1, :2].copy())
-        return None
+            last, tried = longest_box(arrays, grid, samples, i, reach, pad, clearance)
+            trials, reach = trials + tried, max(1, last - i)
+            if last > i:
+                lower, upper = padded(arrays, samples, i, last, pad)
+                found.append(FreeBox(Polygon(), lower, upper, samples[i : last + 1, :2].copy()))
+                i, widest = last, level
+                break
+        else:
+            if np.abs((samples[i + 1] - samples[i]) * scale).max() < finest:
+                return None, trials
+            samples = _finer(samples, i)
+    return found, trials
 
 
 def _finer(samples: FloatArray, i: int) -> FloatArray:

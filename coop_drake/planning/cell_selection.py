@@ -28,7 +28,6 @@ from coop_drake.planning.channel import Channel, CoveredPath, Regions
 from coop_drake.planning.duration import estimated, plan_time, timed
 from coop_drake.planning.limits import NEED_FACTOR, limits_of
 from coop_drake.planning.motion_limits import motion_limits, team_chains, times_at_limits
-from coop_drake.planning.questions import shrunk
 from coop_drake.planning.rescaling import Rescaling
 from coop_drake.planning.sampling.collision import ObstacleGrid, grid_inside
 from coop_drake.planning.transitions import (
@@ -175,9 +174,6 @@ LEVELS = ((0.3, PADS), (0.1, NARROW_PADS))
 LEAST_CLEARANCE = 2e-3
 """Waypoints keep at least this clearance [m]."""
 
-CORE_FRACTION = 0.9
-"""Fraction of the waypoints' clearance that cores keep, so that waypoints lie inside them [-]."""
-
 BOX_COST = 9e-4
 """Every box costs this over its padding besides its time [rad s]: fewer boxes are better if the times are
 equal, and narrow funnels leave little tolerance for what the closed form leaves out."""
@@ -200,7 +196,7 @@ def cover_path(
     """Cover a path with boxes such that the transport is fast: few boxes, and narrow ones in narrow passages.
 
     The boxes are chosen by their times in closed form, see ``choose_boxes``. Every box is then proved
-    free as in the search, by over-sweeps and Minkowski differences at margin zero; a box that is not
+    free as in the search, by over-sweeps and Minkowski differences; a box that is not
     proved is not used.
 
     Args:
@@ -217,8 +213,7 @@ def cover_path(
         shape (2,) [m]; None if no sequence of such boxes was found.
     """
     swept = SweptTree(problem.tree)
-    floor = shrunk(problem.workspace, 0.0)
-    boxes, grid = box_arrays(problem.tree), grid_inside(floor, problem.tree.reach)
+    boxes, grid = box_arrays(problem.tree), grid_inside(problem.workspace, problem.tree.reach)
     angle = float(path[-1, 2] + nearest_turn(float(problem.goal_pose[2] - path[-1, 2])))
     goals = np.array(final_intervals(problem, goal_values(problem, angle, path[-1, 2:])))
     limits = np.full(len(problem.start) - 1, np.inf) if limits is None else limits
@@ -240,13 +235,12 @@ def cover_path(
             boxes, grid, points, places, np.array(pads), goals, schedule_of(gain_set), limits,
             least, problem.passes, room[1:],
         )  # fmt: skip
-        rows, margin = choose_boxes(waypoints), CORE_FRACTION * least_clearance
-        regions = Regions(problem, swept, margin)
+        rows, regions = choose_boxes(waypoints), Regions(problem, swept)
         tried = [regions.around(_box(waypoints, *row)) for row in rows.tolist()]
         free = tuple(box for box in tried if box is not None)  # Over-sweeps prove regions around their ends.
         if 0 < len(free) == len(rows):
             targets = (*(points[j, :2] for j in rows[:-1, 1]), problem.goal_pose[:2])
-            return Channel(free, margin, angle), targets
+            return Channel(free, angle, margin=least_clearance), targets
     return None
 
 
@@ -269,7 +263,7 @@ def _waypoints(
     def between(first: float, last: float, halvings: int) -> list[FloatArray] | None:
         """Waypoints after the first place, the last one at the last place."""
         pair = np.stack([configuration(first), configuration(last)])
-        furthest = longest_box(boxes, grid, pair, 0, 1, pad, least_clearance, 0.0)[1]
+        furthest = longest_box(boxes, grid, pair, 0, 1, pad, least_clearance)[0]
         if furthest == 1:
             return [pair[1]]
         if halvings == 0:
@@ -294,7 +288,7 @@ def _box(waypoints: Waypoints, first: int, last: int, pad: int) -> FreeBox:
     part, width = waypoints.path[first : last + 1], waypoints.pads[pad] + waypoints.room
     lower = np.maximum(waypoints.boxes.lower, part[:, 2:].min(axis=0) - width)
     upper = np.minimum(waypoints.boxes.upper, part[:, 2:].max(axis=0) + width)
-    return FreeBox(Polygon(), Polygon(), lower, upper, part[:, :2].copy())
+    return FreeBox(Polygon(), lower, upper, part[:, :2].copy())
 
 
 # The choice of boxes: a dynamic programme over waypoints, with the time of a box in closed form.

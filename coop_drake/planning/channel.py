@@ -8,54 +8,47 @@ from itertools import pairwise
 
 import numpy as np
 import shapely
-from shapely import MultiPolygon, Point, Polygon
+from shapely import Point
 
 from coop_drake.answers.plan import MixedCell
 from coop_drake.answers.problem import PlanningProblem
 from coop_drake.answers.proof import InfeasibilityProof
 from coop_drake.errors import PlanError
-from coop_drake.geometry.minkowski import FreeSpace, to_polygon
+from coop_drake.geometry.minkowski import to_polygon
 from coop_drake.geometry.passage import pole
 from coop_drake.geometry.polygons import BoundaryDistance, parts_of
 from coop_drake.geometry.swept_tree import Intervals, SweptTree
-from coop_drake.planning.cells.cells import CellMaker, FreeBox, Region, regions_of
-from coop_drake.planning.questions import (
-    disc_polygon,
-    end_in,
-    ending_at,
-    is_patched,
-    marginal_workspace,
-    nearby,
-)
+from coop_drake.planning.cells.cells import CellMaker, FreeBox
+from coop_drake.planning.questions import end_in, ending_at, nearby
 from coop_drake.tree.arrays import FloatArray
 from coop_drake.tree.component_tree import nearest_turn, turns_to
 
 
 @dataclass(frozen=True)
 class Channel:
-    """A sequence of free boxes; the cores and the intervals of consecutive boxes overlap with interior.
+    """A sequence of free boxes; positions and intervals of consecutive boxes overlap with interior.
 
     Attributes:
         boxes: From the box that holds the start to the box that holds the goal.
-        margin: The margin rho that the cores keep [m].
         goal_angle: Theta where it ends, unwrapped along the boxes [rad].
         path: The path that the boxes were laid along, circular axes unwrapped like theirs, shape (m, 3 + n)
             [m, rad]; None if they were found without a path.
         ends: Where that path leaves each box, shape (boxes, 2) [m]; None without a path.
         end: The configuration in which it ends without a path, circles modulo a turn, shape (3 + n,)
             [m, rad]; None for the middle of the goal.
+        margin: The margin rho that the samples of that path keep, measured [m].
     """
 
     boxes: tuple[FreeBox, ...]
-    margin: float
     goal_angle: float
     path: FloatArray | None = None
     ends: FloatArray | None = None
     end: FloatArray | None = None
+    margin: float = 0.0
 
 
 def exits(channel: Channel) -> list[FloatArray]:
-    """Where boxes may be left: the middle of the widest part of each two cores' overlap.
+    """Where boxes may be left: the middle of the widest part of each two boxes' overlap.
 
     An overlap may have several parts, and boxes need not join all of them where it is a tenth of a millimetre
     wide. If a path leaves the boxes there, its own part counts.
@@ -64,13 +57,13 @@ def exits(channel: Channel) -> list[FloatArray]:
         Positions, shape (2,) each [m].
 
     Raises:
-        PlanError: If two cores do not overlap; names them.
+        PlanError: If two boxes do not overlap; names them.
     """
     found = []
     for index, (one, other) in enumerate(pairwise(channel.boxes)):
-        parts = [part for part in parts_of(one.core.intersection(other.core)) if part.area > 0.0]
+        parts = [part for part in parts_of(one.polygon.intersection(other.polygon)) if part.area > 0.0]
         if not parts:
-            raise PlanError(f"cells {index} and {index + 1}: their cores do not overlap")
+            raise PlanError(f"cells {index} and {index + 1}: their positions do not overlap")
         if channel.ends is not None:
             left = Point(channel.ends[index])
             parts = [part for part in parts if part.covers(left)] or parts
@@ -84,7 +77,7 @@ def middle_of(channel: Channel, start: FloatArray) -> FloatArray:
     They are free; what is between them need not be.
 
     Raises:
-        PlanError: If two cores do not overlap.
+        PlanError: If two boxes do not overlap.
     """
     rows = [start]
     for (one, other), place in zip(pairwise(channel.boxes), exits(channel), strict=True):
@@ -95,12 +88,12 @@ def middle_of(channel: Channel, start: FloatArray) -> FloatArray:
 
 @dataclass(frozen=True)
 class CoveredPath:
-    """A path that is covered with boxes proved free; the boxes' polygons are made on request.
+    """A path from start to goal, and a channel of boxes along it that is made on request.
 
     Attributes:
         path: From start to goal, circular axes unwrapped, shape (m, 3 + n) [m, rad].
-        margin: The margin rho that the path keeps in every box [m].
-        channel: Makes the channel of these boxes; raises a GeometryError if geometry fails.
+        margin: The margin rho that its samples keep, measured [m].
+        channel: Makes the channel, proved free; raises a GeometryError if geometry fails.
         another: Finds another path by other samples, for a number (1, 2, ...) that these follow from and the
             share of the usual work that it may take [-]; None if it finds none.
     """
@@ -136,7 +129,7 @@ class NoChannel:
     mixed: tuple[MixedCell, ...] = ()
 
 
-# From free boxes to a channel: all free positions of every box, and those that keep the margin.
+# From free boxes to a channel: all free positions of every box.
 
 MANY_COORDINATES = 150
 """On a floor with more corners only the part near a box is looked at, because Minkowski differences of the
@@ -149,54 +142,26 @@ class Regions:
     Args:
         problem: The question.
         swept: Sweeps of its tree.
-        margin: Margin that cores keep [m].
     """
 
-    def __init__(self, problem: PlanningProblem, swept: SweptTree, margin: float) -> None:
-        self._swept, self._margin = swept, margin
-        self._floor: Polygon | MultiPolygon = problem.workspace
-        patched = margin > 0.0 and is_patched(problem, margin)
-        self._narrow = marginal_workspace(problem, margin) if patched else None
-        self._large = shapely.get_num_coordinates(problem.workspace) > MANY_COORDINATES
-        self._full = None if self._large else self._maker(self._floor)
-        self._core = None if self._large or self._narrow is None else self._maker(self._narrow)
+    def __init__(self, problem: PlanningProblem, swept: SweptTree) -> None:
+        self._swept, self._floor = swept, problem.workspace
+        large = shapely.get_num_coordinates(problem.workspace) > MANY_COORDINATES
+        self._whole = None if large else CellMaker(swept, problem.workspace)
 
     def around(self, box: FreeBox) -> FreeBox | None:
         """A box with the free positions that are connected to its own; None if geometry fails.
 
         On a large floor only the part near the box is looked at: the result is smaller, but as free.
         """
-        full = _joined(self._cells(self._full, self._floor, box), box)
-        if full is None:
-            return None
-        if self._margin == 0.0:
-            return _filled(box, full, full)
-        if self._narrow is not None:
-            core = _joined(self._cells(self._core, self._narrow, box), box)
-        else:
-            section = FreeSpace(full.rings).minus(disc_polygon(self._margin))
-            core = _joined(regions_of(section, over=False), box)
-        return None if core is None else _filled(box, full, core)
-
-    def _cells(
-        self, maker: CellMaker | None, floor: Polygon | MultiPolygon, box: FreeBox
-    ) -> Sequence[Region]:
+        maker, ends = self._whole, box.positions[[0, -1]]
         if maker is None:
-            near = nearby(floor, box.positions, self._swept.tree.reach)
-            maker = None if near.is_empty else self._maker(near)
-        return [] if maker is None else maker.under_cells(box.intervals)
-
-    def _maker(self, floor: Polygon | MultiPolygon) -> CellMaker:
-        return CellMaker(self._swept, floor)
-
-
-def _joined(regions: Sequence[Region], box: FreeBox) -> Region | None:
-    ends = box.positions[[0, -1]]
-    return next((region for region in regions if region.depths(ends).min() > 0.0), None)
-
-
-def _filled(box: FreeBox, full: Region, core: Region) -> FreeBox:
-    return replace(box, polygon=to_polygon(full.section), core=to_polygon(core.section))
+            near = nearby(self._floor, box.positions, self._swept.tree.reach)
+            maker = None if near.is_empty else CellMaker(self._swept, near)
+        for region in () if maker is None else maker.under_cells(box.intervals):
+            if region.depths(ends).min() > 0.0:
+                return replace(box, polygon=to_polygon(region.section))
+        return None
 
 
 def unwrapped(
@@ -221,15 +186,12 @@ def unwrapped(
     return result
 
 
-def make_channel(
-    problem: PlanningProblem, boxes: Sequence[FreeBox], margin: float, path: FloatArray | None
-) -> Channel:
+def make_channel(problem: PlanningProblem, boxes: Sequence[FreeBox], path: FloatArray | None) -> Channel:
     """Make a channel of free boxes.
 
     Args:
         problem: The question.
         boxes: Free boxes, of which consecutive ones overlap.
-        margin: The margin that the cores keep [m].
         path: The path that they were laid along, shape (m, 3 + n); None if there is none.
     """
     start = problem.start[2:].tolist()
@@ -242,8 +204,8 @@ def make_channel(
         )
         for box, angles in zip(boxes, turned, strict=True)
     )
-    end = None if path is not None else end_in(problem, turned[-1], BoundaryDistance(free[-1].core))
+    end = None if path is not None else end_in(problem, turned[-1], BoundaryDistance(free[-1].polygon))
     asked = problem if end is None else ending_at(problem, end)
     middle = 0.5 * (free[-1].lower[0] + free[-1].upper[0])
     goal = float(middle + nearest_turn(float(asked.goal_pose[2]) - middle))
-    return Channel(free, margin, goal, path, end=end)
+    return Channel(free, goal, path, end=end)

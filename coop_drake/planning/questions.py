@@ -160,11 +160,6 @@ def marginal_workspace(problem: PlanningProblem, margin: float) -> MultiPolygon:
     return result
 
 
-def is_patched(problem: PlanningProblem, margin: float) -> bool:
-    """Whether the floor near the start or goal is shrunk by less than the margin."""
-    return bool(_close_ends(problem, margin))
-
-
 def _close_ends(problem: PlanningProblem, margin: float) -> list[tuple[BaseGeometry, float]]:
     """Footprints at start and goal that are too close to a wall for a margin, and their clearances [m]."""
     close = []

@@ -132,12 +132,12 @@ class Rescaling:
         return CoveredPath(path, margin, lambda: self._channel(found.channel()), another)
 
     def _channel(self, found: Channel) -> Channel:
-        scaled = (self._scaled_box(box, self._units[2:], "polygon", "core") for box in found.boxes)
+        scaled = (self._scaled_box(box, self._units[2:], "polygon") for box in found.boxes)
         boxes = tuple(replace(box, positions=self.unit * box.positions) for box in scaled)
         path = None if found.path is None else found.path * self._units
         ends = None if found.ends is None else found.ends * self.unit
         end = None if found.end is None else found.end * self._units
-        return replace(found, boxes=boxes, margin=self.unit * found.margin, path=path, ends=ends, end=end)
+        return replace(found, boxes=boxes, path=path, ends=ends, end=end, margin=self.unit * found.margin)
 
     def watched(self, watch: Watch | None) -> Watch | None:
         """A function that expresses every event in metres before it is passed on."""

@@ -14,7 +14,7 @@ from shapely.errors import ShapelyError
 from coop_drake.answers.problem import PlanningProblem, at_goal, goal_box
 from coop_drake.errors import GeometryError
 from coop_drake.geometry.swept_tree import SweptTree
-from coop_drake.planning.boxes import Certifier
+from coop_drake.planning.boxes import free_boxes
 from coop_drake.planning.cells.cells import FreeBox
 from coop_drake.planning.channel import Channel, CoveredPath, Regions, make_channel
 from coop_drake.planning.questions import (
@@ -27,7 +27,7 @@ from coop_drake.planning.questions import (
 from coop_drake.planning.sampling.band import (
     another_candidate,
     best_candidate,
-    margins_to_try,
+    kept_margin,
     moved_from_obstacles,
     smoothed,
 )
@@ -92,7 +92,7 @@ only if boxes cannot cover the path after the shorter one."""
 
 
 class SampledSearch:
-    """Finds a path that boxes cover at margin zero first, then looks for a larger margin near it.
+    """Finds a path that boxes cover, then moves it away from the walls.
 
     What it finds is proved by the boxes, whatever was sampled. If it finds nothing, that is no proof.
 
@@ -121,7 +121,7 @@ class SampledSearch:
         progress: Callable[[float], None] | None = None,
         part: tuple[int, ...] | None = None,
     ) -> Iterator[CoveredPath | None]:
-        """Sample some paths and cover each of them at margin zero, all with other samples.
+        """Sample some paths and cover each of them, all with other samples.
 
         Args:
             number: How many.
@@ -140,7 +140,7 @@ class SampledSearch:
             yield found
 
     def around(self, guide: FloatArray) -> CoveredPath | None:
-        """Sample paths around another one, which need not be free, and cover them at margin zero.
+        """Sample paths around another one, which need not be free, and cover them.
 
         Args:
             guide: Configurations, circular axes unwrapped, shape (m, 3 + n) [m, rad].
@@ -181,7 +181,7 @@ class SampledSearch:
         found = None
         for spacing, moves in FIRST_SMOOTHINGS if len(path) else ():
             path = smoothed(self._problem, path, clearance, 0.0, gap, spacing, moves)
-            found = self._covered(path, 0.0, longest=True)
+            found = self._covered(path)
             if found is not None:
                 break
         return found, sampler.object_blocked
@@ -193,7 +193,7 @@ class SampledSearch:
         *,
         object_first: bool = False,
     ) -> CoveredPath | None:
-        """Look for a path through passages that are too narrow for samples, and cover it at margin zero.
+        """Look for a path through passages that are too narrow for samples, and cover it.
 
         Paths are first sought on floors that are larger, and repaired until they fit the floor. The best of
         those that almost fit are moved to the middle of their passages. They are covered with the smallest
@@ -218,14 +218,14 @@ class SampledSearch:
                 if not len(path):
                     continue
                 path, short = repaired(self._problem, path, growth)
-                found = None if short > 0.0 else self._covered(path, 0.0, longest=True)
+                found = None if short > 0.0 else self._covered(path)
                 if found is not None:
                     return found
                 if short < CENTRED_SHORT:
                     fitting.append((short, path))
             for needed, path in sorted(fitting, key=lambda one: one[0])[:CENTRED_PATHS]:
                 moved, short = centred(self._problem, path, needed)
-                found = None if short > 0.0 else self._covered(moved, 0.0, longest=True, smallest=True)
+                found = None if short > 0.0 else self._covered(moved, smallest=True)
                 if found is not None:
                     return found
         return None
@@ -257,22 +257,18 @@ class SampledSearch:
             return np.empty((0, len(self._problem.start)))
         return sampler.path_around(GuidePath(path, guide.joints), NARROW_SAMPLES)
 
-    def with_margin(
-        self, first: CoveredPath, progress: Callable[[float, float], None], share: float = 1.0
-    ) -> CoveredPath:
-        """Move the best path away from the walls, and cover it at the largest margin that it keeps.
+    def with_margin(self, first: CoveredPath, share: float = 1.0) -> CoveredPath:
+        """Move the best path away from the walls, and cover it.
 
         Args:
-            first: Boxes at margin zero.
+            first: A path that is covered.
             share: Share of the usual work that is spent on the path [-].
-            progress: Called with a margin [m] and the fraction of the path that is covered.
 
         Returns:
-            Boxes at a margin; at margin zero if no other margin is kept.
+            The path moved; the first one if the moved one cannot be covered.
         """
-        progress(0.0, 0.0)
         near = best_candidate(self._problem, self._hierarchy, first.path, BODY_GAP, share)
-        return self._moved(near, share, progress) or self._covered(first.path, 0.0) or first
+        return self._moved(near, share) or first
 
     def another(self, number: int, share: float) -> CoveredPath | None:
         """Find another path by other samples; see ``CoveredPath``."""
@@ -282,37 +278,18 @@ class SampledSearch:
         except (GeometryError, ShapelyError):
             return None
 
-    def _moved(
-        self, near: FloatArray, share: float, progress: Callable[[float, float], None] | None = None
-    ) -> CoveredPath | None:
-        """Move a path away from the walls, and cover it at the largest margin that it keeps."""
+    def _moved(self, near: FloatArray, share: float) -> CoveredPath | None:
+        """Move a path away from the walls, and cover it."""
         path = moved_from_obstacles(self._problem, near, BODY_GAP, share)
-        for margin in margins_to_try(self._problem, path):
-            if progress is not None:
-                progress(margin, 0.0)
-            try:
-                found = self._covered(path, margin, progress)
-            except (GeometryError, ShapelyError):
-                found = None
-            if found is not None:
-                return found
-        return self._covered(path, 0.0)
+        return self._covered(path, kept_margin(self._problem, path))
 
     def _covered(
-        self,
-        path: FloatArray,
-        margin: float,
-        progress: Callable[[float, float], None] | None = None,
-        *,
-        longest: bool = False,
-        smallest: bool = False,
+        self, path: FloatArray, margin: float = 0.0, *, smallest: bool = False
     ) -> CoveredPath | None:
-        """Cover a path with boxes that keep a margin."""
-        workspace = marginal_workspace(self._problem, margin)
-        certifier = Certifier(self._problem.tree, workspace, self._scale, margin)
-        report = None if progress is None else (lambda fraction: progress(margin, fraction))
-        boxes = certifier.boxes(path, report, longest=longest, smallest=smallest)
-        self.slices += certifier.trials
+        """Cover a path, which keeps a margin at its samples, with boxes."""
+        tree, floor = self._problem.tree, self._problem.workspace
+        boxes, trials = free_boxes(tree, floor, self._scale, path, smallest=smallest)
+        self.slices += trials
         if boxes is None:
             return None
         return CoveredPath(path, margin, partial(self._channel, boxes, path, margin), self.another)
@@ -328,13 +305,13 @@ class SampledSearch:
         Raises:
             GeometryError: If geometry fails.
         """
-        regions = Regions(self._problem, self._swept, margin)
+        regions = Regions(self._problem, self._swept)
         made = [regions.around(box) for box in boxes]
         free = [box for box in made if box is not None]
         if len(free) < len(boxes):
             raise GeometryError("the free positions of the boxes along a path cannot be computed")
         ends = np.array([box.positions[-1] for box in boxes])
-        return replace(make_channel(self._problem, free, margin, path), ends=ends)
+        return replace(make_channel(self._problem, free, path), ends=ends, margin=margin)
 
 
 # A free end within the goal's tolerances, where the middle of the goal is not free.

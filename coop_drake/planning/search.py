@@ -6,14 +6,13 @@
 4. Explorations of the whole team and of its relaxations take turns with more samples, with twice the slices
    in every round, until one of them answers or the budget is spent.
 
-A sampled path is then moved away from the walls and covered again at the largest margin that it keeps.
+A sampled path is then moved away from the walls and covered again.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import replace
 from functools import cached_property
 from time import thread_time
 
@@ -73,7 +72,7 @@ seconds, and a round of explorations ten or more."""
 def find_channel(
     problem: PlanningProblem, progress: Progress | None = None, watch: Watch | None = None
 ) -> tuple[Channel | NoChannel, SearchReport]:
-    """Find a channel at any margin or prove that there is none; like ``find_path`` with the channel made.
+    """Find a channel or prove that there is none; like ``find_path`` with the channel made.
 
     Returns:
         The channel, or why there is none, and a report.
@@ -94,9 +93,9 @@ def find_path(
     *,
     route: FloatArray | None = None,
 ) -> tuple[CoveredPath | Channel | NoChannel, SearchReport]:
-    """Find a path that boxes cover, or prove that there is none; then look for a larger margin.
+    """Find a path that boxes cover, or prove that there is none; then move it away from the walls.
 
-    Only explorations of cells may answer "infeasible", and only at margin zero. Budgets are counted in
+    Only explorations of cells may answer "infeasible". Budgets are counted in
     samples and slices, never in time, so the same question has the same answer.
 
     Args:
@@ -214,7 +213,7 @@ class _Search:
                 return self._proofs.refutation
             if verdict is Verdict.FOUND:
                 self._first_plan = thread_time() - self._began
-                return self._around(make_channel(self._problem, self._proofs.boxes(), 0.0, None))
+                return self._around(make_channel(self._problem, self._proofs.boxes(), None))
             found = self._sampled(ATTEMPTS_PER_ROUND, before)
             if found is None and 0 < self._narrow_attempts < NARROW_ATTEMPTS:
                 found = self._narrow_sampled()
@@ -265,22 +264,12 @@ class _Search:
         return verdict
 
     def _with_margin(self, found: CoveredPath) -> CoveredPath:
-        """The path at the largest margin that is found."""
-
-        def report(margin: float, fraction: float) -> None:
-            self._phase(f"searching at margin {self._unit * margin:.3f} m")(fraction)
-
+        """The best path, moved away from the walls."""
         try:
-            best = self._samples.with_margin(found, report, min(1.0, self._problem.settings.effort))
+            self._phase("moving the path away from the walls")(0.0)
+            return self._samples.with_margin(found, min(1.0, self._problem.settings.effort))
         except (GeometryError, ShapelyError, PatienceError):
             return found
-
-        def channel() -> Channel:
-            with suppress(GeometryError):
-                return best.channel()
-            return found.channel()
-
-        return replace(best, channel=channel)
 
     def _undecided(self, verdict: Verdict) -> NoChannel:
         bound, slices = clearance_bound(self._problem)
@@ -324,7 +313,7 @@ def search_by_cells(
     )
     report = SearchReport(outcome.slices)
     if outcome.verdict is Verdict.FOUND:
-        return make_channel(problem, exploration.boxes(outcome.path), 0.0, None), report
+        return make_channel(problem, exploration.boxes(outcome.path), None), report
     if outcome.verdict is not Verdict.INFEASIBLE:
         reason = outcome.verdict.explanation(outcome.slices)
         return NoChannel(False, reason, mixed=exploration.undecided(outcome.path)), report

@@ -217,8 +217,7 @@ def keyframe_figure(
     figure = Figure(figsize=_SIZE, dpi=100)
     FigureCanvasAgg(figure)
     figure.text(0.02, 0.955, frame.headline, fontsize=15, fontweight="bold", va="center", color=colours.INK)
-    margin = "" if recording.margin == 0.0 else f", {recording.margin:g} m from the walls"
-    below = f"{frame.state.question}{margin}  ·  {frame.counters}"
+    below = f"{frame.state.question}  ·  {frame.counters}"
     figure.text(0.02, 0.915, below, fontsize=10, va="center", color=colours.GREY)
     _draw_floor(figure.add_axes((0.05, 0.175, 0.43, 0.68)), recording, frame)
     axes = recording.axes_of(frame.state.robots)

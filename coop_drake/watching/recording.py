@@ -28,7 +28,6 @@ from coop_drake.planning.cells.exploration import (
 )
 from coop_drake.planning.cells.graph import GraphCell, Kind
 from coop_drake.planning.channel import Channel
-from coop_drake.planning.questions import marginal_workspace
 from coop_drake.planning.search import find_channel
 from coop_drake.progress import Progress
 from coop_drake.tree.arrays import FloatArray
@@ -51,14 +50,12 @@ class SearchRecording:
 
     Attributes:
         problem: The planning problem.
-        margin: Clearance that the channel keeps from the walls [m].
         events: What happened, in order.
         verdict: How the search ended.
         reason: Why there is no channel, in a sentence; empty if the events say it.
     """
 
     problem: PlanningProblem
-    margin: float
     events: tuple[Event, ...]
     verdict: Verdict
     reason: str = ""
@@ -93,13 +90,13 @@ def record_search(
 ) -> SearchRecording:
     """Search for a plan, and record every event of the search.
 
-    The problem's settings give the budget of slices, and the margin that the portfolio keeps where it can.
+    The problem's settings give the budget of slices.
     """
     if strategy == "portfolio":
         return _record_portfolio(problem, progress)
     events: list[Event] = []
     algorithm = Exploration if strategy == "cells" else PaperExploration
-    exploration = algorithm(problem, marginal_workspace(problem, 0.0), events.append)
+    exploration = algorithm(problem, None, events.append)
     budget = problem.settings.max_slices
 
     def count(slices: int) -> None:
@@ -107,7 +104,7 @@ def record_search(
             progress(f"{slices} slices", slices / budget)
 
     outcome = exploration.run(budget, count)
-    return SearchRecording(problem, 0.0, tuple(events), outcome.verdict)
+    return SearchRecording(problem, tuple(events), outcome.verdict)
 
 
 def _record_portfolio(problem: PlanningProblem, progress: Progress | None) -> SearchRecording:
@@ -117,12 +114,12 @@ def _record_portfolio(problem: PlanningProblem, progress: Progress | None) -> Se
     answer, _ = find_channel(asked, progress, watch=events.append)
     if isinstance(answer, Channel):
         events += _box_events(answer, tuple(sorted({joint.robot for joint in problem.tree.joints})))
-        return SearchRecording(problem, answer.margin, tuple(events), Verdict.FOUND)
+        return SearchRecording(problem, tuple(events), Verdict.FOUND)
     verdict = Verdict.INFEASIBLE if answer.proved else Verdict.BUDGET
     last = events[-1] if events else None
     if not (isinstance(last, ExplorationEnded) and last.verdict == verdict.value):
         events += [ExplorationBegan(answer.reason, ()), ExplorationEnded(verdict.value, 0)]
-    return SearchRecording(problem, 0.0, tuple(events), verdict, answer.reason)
+    return SearchRecording(problem, tuple(events), verdict, answer.reason)
 
 
 def _box_events(channel: Channel, robots: tuple[int, ...]) -> list[Event]:

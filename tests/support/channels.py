@@ -27,9 +27,8 @@ def bent_channel(cells=8, radius=0.32):
         lower = np.array([middle - 0.7 * width, -0.3 + 0.05 * (k % 2), -0.3])
         upper = np.array([middle + 0.7 * width, 0.3, 0.3 + 0.05 * (k % 2)])
         polygon = part_at(problem.workspace.buffer(-room), problem.start[:2])
-        core = part_at(problem.workspace.buffer(-room - MARGIN), problem.start[:2])
-        boxes.append(FreeBox(polygon, core, lower, upper))
-    return problem, Channel(tuple(boxes), MARGIN, float(goal))
+        boxes.append(FreeBox(polygon, lower, upper))
+    return problem, Channel(tuple(boxes), float(goal), margin=MARGIN)
 
 
 def part_at(shape, point):

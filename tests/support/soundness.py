@@ -33,12 +33,12 @@ def no_channel(problem: PlanningProblem, *, proved: bool = True) -> NoChannel:
 
 
 def assert_channel_is_sound(problem: PlanningProblem, channel: Channel, samples: int = 6) -> None:
-    """Start in the first core, goal in the last, overlaps with interior, nothing touched in any box."""
+    """Start in the first box, goal in the last, overlaps with interior, nothing touched in any box."""
     first, last = channel.boxes[0], channel.boxes[-1]
-    assert first.core.contains(Point(problem.start[:2]))
+    assert first.polygon.contains(Point(problem.start[:2]))
     assert np.all(first.lower <= problem.start[2:])
     assert np.all(problem.start[2:] <= first.upper)
-    assert last.core.contains(Point(problem.goal_pose[:2]))
+    assert last.polygon.contains(Point(problem.goal_pose[:2]))
     assert last.lower[0] < channel.goal_angle < last.upper[0]
     assert np.isclose(np.remainder(channel.goal_angle - problem.goal_pose[2] + np.pi, 2 * np.pi), np.pi)
     values = goal_values(problem, channel.goal_angle, 0.5 * (last.lower + last.upper))
@@ -49,9 +49,8 @@ def assert_channel_is_sound(problem: PlanningProblem, channel: Channel, samples:
         assert value == asked or (joint.circular and turned)
     for one, other in zip(channel.boxes[:-1], channel.boxes[1:], strict=True):
         assert np.all(np.minimum(one.upper, other.upper) - np.maximum(one.lower, other.lower) > 1e-6)
-        assert maximum_inscribed_circle(one.core.intersection(other.core), tolerance=1e-4).length > 1e-4
+        assert maximum_inscribed_circle(one.polygon.intersection(other.polygon), tolerance=1e-4).length > 1e-4
     for number, box in enumerate(channel.boxes):
-        assert box.polygon.buffer(1e-6).contains(box.core)
         assert np.all(box.lower[1:] >= problem.tree.joint_lower)
         assert np.all(box.upper[1:] <= problem.tree.joint_upper)
         assert_box_is_free(problem, box, samples, number)

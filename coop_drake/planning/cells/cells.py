@@ -88,9 +88,8 @@ class FreeBox:
     """A set of configurations proved free: every position in ``polygon`` with every angle in the intervals.
 
     Attributes:
-        polygon: Positions p_WL, one connected component of the under-approximation at margin zero [m]; empty
-            while only the positions of a path are known.
-        core: The positions that keep the plan's margin, one connected component; a subset of ``polygon`` [m].
+        polygon: Positions p_WL, one connected component of the under-approximation [m]; empty while only the
+            positions of a path are known.
         lower: Lower ends of (theta, q...), expanded by the overlap, circular axes unwrapped, shape
             (1 + n,) [rad, m].
         upper: Upper ends, shape (1 + n,).
@@ -99,7 +98,6 @@ class FreeBox:
     """
 
     polygon: Polygon
-    core: Polygon
     lower: FloatArray
     upper: FloatArray
     positions: FloatArray = field(default_factory=lambda: np.empty((0, 2)))
@@ -111,10 +109,9 @@ class FreeBox:
 
     @classmethod
     def of(cls, intervals: Intervals, region: Region) -> FreeBox:
-        """A box of some intervals whose positions are those of a region, at no margin."""
+        """A box of some intervals whose positions are those of a region."""
         lower, upper = np.array(intervals).T.copy()
-        polygon = to_polygon(region.section)
-        return cls(polygon, polygon, lower, upper)
+        return cls(to_polygon(region.section), lower, upper)
 
 
 # Positions at which walls on either side hold two round pieces so near to each other that these overlap.

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from itertools import takewhile
 
 import numpy as np
@@ -332,8 +331,9 @@ so many repetitions: in such a passage every millimetre saves a minute."""
 NARROW_KEPT_FRACTION = 0.8
 """Fraction of its clearance that a path keeps meanwhile [-]."""
 
-MARGIN_FRACTIONS = (0.8, 0.65, 0.5, 0.35)
-"""Fractions of a path's clearance that its boxes may keep as a margin, tried in this order [-]."""
+MARGIN_FRACTION, LEAST_FRACTION = 0.8, 0.35
+"""Fraction of a path's clearance that counts as its margin, and the margin over the clearance above which
+more does not matter [-]."""
 
 
 def best_candidate(
@@ -394,7 +394,7 @@ def moved_from_obstacles(
         gap: Smallest distance between bodies of the team [m].
         share: Share of the usual number of moves that is tried [-].
     """
-    most = problem.settings.margin / min(MARGIN_FRACTIONS)
+    most = problem.settings.margin / LEAST_FRACTION
     path = smoothed(
         problem, path, LEAST_CLEARANCE, 0.0, gap, moves=round(share * WIDE_MOVES), price=WIDE_PRICE
     )
@@ -423,16 +423,13 @@ def centred_in_narrow_passages(problem: PlanningProblem, path: FloatArray, gap: 
     return path
 
 
-def margins_to_try(problem: PlanningProblem, path: FloatArray) -> Iterator[float]:
-    """Margins to try for boxes along a path, largest first; those too small to be worth it are left out [m].
+def kept_margin(problem: PlanningProblem, path: FloatArray) -> float:
+    """The margin that a path keeps at its samples, zero where it is too small to be worth it [m].
 
     Args:
         problem: The question, whose settings hold the largest margin.
         path: A free path, circular axes unwrapped, shape (m, 3 + n) [m, rad].
     """
     largest = problem.settings.margin
-    clearance = path_clearance(problem, path, largest / MARGIN_FRACTIONS[0])
-    for fraction in MARGIN_FRACTIONS:
-        margin = min(fraction * clearance, largest)
-        if margin >= SMALLEST_MARGIN:
-            yield margin
+    margin = min(MARGIN_FRACTION * path_clearance(problem, path, largest / MARGIN_FRACTION), largest)
+    return margin if margin >= SMALLEST_MARGIN else 0.0
