@@ -115,29 +115,7 @@ class PatienceError(CoopDrakeError):
 
 
 class FieldError(CoopDrakeError):
-    """A harmonic map cannot be built, or its error is too large; the message names the corner or gap."""
-
-
-class UnmappableError(FieldError):
-    """No harmonic map within the tolerance was found for a shape; the message names the corner or gap.
-
-    Args:
-        message: What is wrong, with the place.
-        place: The place in W, (x, y) [m].
-        angle: Interior angle of the corner that is too sharp [degrees], None for a gap.
-        width: Width of the gap that is too narrow [m], None for a corner.
-    """
-
-    def __init__(
-        self,
-        message: str,
-        place: tuple[float, float],
-        *,
-        angle: float | None = None,
-        width: float | None = None,
-    ) -> None:
-        self.place, self.angle, self.width = place, angle, width
-        super().__init__(message)
+    """A harmonic map cannot be built, or its error is too large; the message names the place."""
 
 
 class StallError(CoopDrakeError):

@@ -132,9 +132,7 @@ def test_accuracies_of_all_cells_are_written_and_summed_up(tmp_path):
     rows = document["maps"]
     assert [row["cell"] for row in rows] == list(range(len(PLAN.cells)))
     assert all(0.0 < row["residual"] <= row["error_estimate"] <= 1e-9 for row in rows)
-    assert all(
-        row["condition"] > 1.0 and row["unknowns"] > 0 and row["worst_place_description"] for row in rows
-    )
+    assert all(row["condition"] > 1.0 and row["unknowns"] > 0 and row["worst_place"] for row in rows)
     assert reporter.facts["max_map_residual"] == max(row["residual"] for row in rows)
     assert reporter.facts["max_map_unknowns"] == max(row["unknowns"] for row in rows)
     assert reporter.facts["mapping_wall_seconds"] > 0.0
@@ -175,6 +173,6 @@ def test_the_cache_lies_where_the_system_keeps_caches_unless_named(monkeypatch):
 
 
 def test_a_tolerance_that_cannot_be_met_fails_with_cell_place_and_key(tmp_path):
-    message = r"cell 0 of 3: .*at fault is the .*room\.scenario\.yaml: maps\.tolerance is 1e-15"
+    message = r"cell 0 of 3: .*the error is largest at .*room\.scenario\.yaml: maps\.tolerance is 1e-15"
     with pytest.raises(FieldError, match=message):
         map_cells(task_with(tmp_path, 1e-15), PLAN, Reporter(machine=True, quiet=True), fresh=True)

@@ -21,7 +21,7 @@ import shapely
 from numpy.typing import ArrayLike
 from shapely import Point, Polygon
 
-from coop_drake.errors import FieldError, UnmappableError
+from coop_drake.errors import FieldError
 from coop_drake.files import write_atomically
 from coop_drake.harmonic_maps import TOLERANCE
 from coop_drake.harmonic_maps.assemble import pack_layers
@@ -46,8 +46,6 @@ _MAX_UNKNOWNS = 40_000
 #: Chebyshev points [-]: denser than the nodes of a panel, and different from them.
 _ON_PANEL = np.sort(np.cos(np.pi * (np.arange(23) + 0.5) / 23))
 _ON_RING = np.cos(np.pi * (np.arange(5) + 0.5) / 5)
-_NARROW = 0.01
-"""Width of a gap, per length of the walls of the corner beside it, below which the gap is at fault [-]."""
 _RINGS = np.array([0, 1, 2, 3, 5, 8, 13, 21, 33])
 """Dyadic rings of a corner on which the residual is sampled: down to 1e-10 of its legs."""
 
@@ -67,9 +65,6 @@ class MapAccuracy:
         unknowns: Size of the linear system.
         condition: Estimate of its condition in the 1-norm.
         worst_place: Where the residual is largest, in W [m], shape (2,).
-        worst_place_description: The corner or gap there, in words.
-        worst_angle: Interior angle of the corner there [degrees], None at a gap.
-        worst_gap: Width of the gap there [m], None at a corner.
     """
 
     residual: float
@@ -78,9 +73,6 @@ class MapAccuracy:
     unknowns: int
     condition: float
     worst_place: FloatArray
-    worst_place_description: str
-    worst_angle: float | None = None
-    worst_gap: float | None = None
 
     def plain(self) -> dict[str, Any]:
         """The values by name, for JSON."""
@@ -164,8 +156,7 @@ class HarmonicMap:
         solution: The result of solving.
 
     Raises:
-        FieldError: If the domain or the goal is not usable.
-        UnmappableError: If no attempt reaches the tolerance: names the corner or the gap at fault.
+        FieldError: Or if no attempt reaches the tolerance: names the place where the error is largest.
     """
 
     def __init__(
@@ -213,7 +204,7 @@ def _solve(outline: Outline, goal: Point | Polygon, tolerance: float) -> Solutio
     The image of the goal, the target, is looked up if it is a point.
 
     Raises:
-        UnmappableError: If more nodes do not reduce the error, or would be too many, or the system is so
+        FieldError: If more nodes do not reduce the error, or would be too many, or the system is so
             close to singular, as narrow gaps make it, that rounding alone may exceed the tolerance.
     """
     best: MapAccuracy | None = None
@@ -242,32 +233,16 @@ def _solve(outline: Outline, goal: Point | Polygon, tolerance: float) -> Solutio
         if _EPSILON * best.condition > tolerance:  # more nodes do not reduce rounding errors
             break
     if best is None:
-        raise _too_large(outline, panels, unknowns)
+        raise FieldError(
+            f"the harmonic map would take {unknowns} unknowns, at most {_MAX_UNKNOWNS} are allowed; the "
+            f"narrowest gap is {panels.gap.min():.3g} m"
+        )
     rounding = _EPSILON * best.condition
     why = f", and rounding alone may cost {rounding:.2g}" if rounding > tolerance else ""
-    raise UnmappableError(
+    x, y = best.worst_place
+    raise FieldError(
         f"the harmonic map is accurate to about {best.error_estimate:.2g}; {tolerance:.2g} was asked for"
-        f"{why}; at fault is {best.worst_place_description}",
-        (float(best.worst_place[0]), float(best.worst_place[1])),
-        angle=best.worst_angle,
-        width=best.worst_gap,
-    )
-
-
-def _too_large(outline: Outline, panels: Panels, unknowns: int) -> UnmappableError:
-    """The refusal of a system of too many unknowns, by the narrowest gap."""
-    k = int(np.argmin(panels.gap))
-    edge = int(panels.edge[k])
-    tangent = (outline.ends - outline.vertices)[edge]
-    place = outline.vertices[edge] + 0.5 * (panels.start + panels.end)[k] * tangent / abs(tangent)
-    description, angle, width = _find_fault(outline, panels, place, edge)
-    where = place + outline.centre
-    return UnmappableError(
-        f"the harmonic map would take {unknowns} unknowns, at most {_MAX_UNKNOWNS} are allowed; narrowest is "
-        + description,
-        (where.real, where.imag),
-        angle=angle,
-        width=width,
+        f"{why}; the error is largest at ({x:.6g}, {y:.6g}) m"
     )
 
 
@@ -299,7 +274,7 @@ def _estimate_accuracy(outline: Outline, panels: Panels, flat: FlatMap, density:
     position, expected, edge = _samples(outline, panels, density.hole_images)
     vertices = np.minimum(np.abs(position - outline.vertices[edge]), np.abs(position - outline.ends[edge]))
     clear = vertices > 100.0 * flat[2]  # rounding would move closer samples across the other wall
-    position, expected, edge = position[clear], expected[clear], edge[clear]
+    position, expected = position[clear], expected[clear]
     images, _ = evaluate_many(flat, np.column_stack((position.real, position.imag)))
     residuals = np.abs(images[:, 0] + 1j * images[:, 1] - expected)
     residuals = np.where(np.isfinite(residuals), residuals, np.inf)
@@ -312,7 +287,6 @@ def _estimate_accuracy(outline: Outline, panels: Panels, flat: FlatMap, density:
         len(density.weighted) + outline.holes,
         density.condition,
         np.array([place.real, place.imag]),
-        *_find_fault(outline, panels, position[worst], int(edge[worst])),
     )
 
 
@@ -333,37 +307,6 @@ def _samples(
     constants = np.concatenate(([0.0], hole_images @ np.array([1.0, 1.0j])))
     expected = np.where(outline.ring[edge] == 0, np.exp(1j * angle), constants[outline.ring[edge]])
     return outline.vertices[edge] + (outline.ends - outline.vertices)[edge] * part, expected, edge
-
-
-def _find_fault(
-    outline: Outline, panels: Panels, place: complex, edge: int
-) -> tuple[str, float | None, float | None]:
-    """Name what limits the accuracy at a place of the boundary.
-
-    Near a vertex that is its corner, unless another wall is far nearer than the corner's own walls are long.
-
-    Returns:
-        The name of the corner or the gap; the corner's interior angle [degrees]; the gap's width [m].
-    """
-    starts, ends = outline.vertices, outline.ends
-    near = [k for k in (edge, int(outline.following[edge])) if abs(place - starts[k]) <= 1.5 * panels.legs[k]]
-    if near:
-        place = starts[near[0]]
-        along = np.clip(np.real((place - starts) / (ends - starts)), 0.0, 1.0)
-        own = [int(outline.preceding[near[0]]), near[0]]
-        distance = np.abs(starts + along * (ends - starts) - place)
-        gap = float(np.delete(distance, own).min(initial=np.inf))
-        corner = gap >= _NARROW * np.abs(ends - starts)[own].min()
-    else:
-        away = np.abs(0.5 * (panels.start + panels.end) - abs(place - starts[edge]))
-        gap = float(panels.gap[np.argmin(np.where(panels.edge == edge, away, np.inf))])
-        corner = False
-    where = place + outline.centre
-    at = f"at ({where.real:.6g}, {where.imag:.6g}) m"
-    if corner:
-        angle = float(np.rad2deg(outline.corner_angles[near[0]]))
-        return f"the corner {at} with interior angle {angle:.4g} degrees", angle, None
-    return f"the gap of {gap:.3g} m {at}", None, gap
 
 
 # Keeps solved maps on disk, by a digest of domain, goal, tolerance and code.

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from shapely import Point, Polygon
 from shapely.geometry.base import BaseGeometry
 
-from coop_drake.errors import FieldError, UnmappableError
+from coop_drake.errors import FieldError
 from coop_drake.geometry.polygons import corners_of, extent_of, parts_of
 from coop_drake.geometry.simplify import sharpest_angle, simplify_inward
 from coop_drake.tree.arrays import ComplexArray, FloatArray, IntArray
@@ -171,7 +171,7 @@ def outline_of(region: Polygon, target: Point | Polygon) -> Outline:
     of `region_to_map`: the target is a point, a hole of F, or one arc of its outer ring.
 
     Raises:
-        UnmappableError: If rings touch, or a corner is sharper than a degree.
+        FieldError: If a ring has no area, if rings touch, or a corner is sharper than a degree.
     """
     oriented = shapely.orient_polygons(shapely.force_2d(region))
     centre = complex(*oriented.envelope.centroid.coords[0])
@@ -214,14 +214,11 @@ def _refuse_touching_rings(region: Polygon, scale: float) -> None:
     rings = [region.exterior, *region.interiors]
     for k, ring in enumerate(rings):
         for other in rings[:k]:
-            width = float(ring.distance(other))
-            if width <= _STRAIGHT * scale:
+            if ring.distance(other) <= _STRAIGHT * scale:
                 x, y = shapely.shortest_line(ring, other).coords[0]
-                raise UnmappableError(
+                raise FieldError(
                     f"a ring of the domain touches another at ({x:.6g}, {y:.6g}) m; "
-                    "leave a gap or let them overlap",
-                    (x, y),
-                    width=width,
+                    "leave a gap or let them overlap"
                 )
 
 
@@ -232,11 +229,9 @@ def _refuse_spikes(outline: Outline) -> None:
     angle = float(angles[worst])
     if min(angle, 360.0 - angle) < _SHARPEST:
         place = outline.vertices[worst] + outline.centre
-        raise UnmappableError(
+        raise FieldError(
             f"the corner at ({place.real:.6g}, {place.imag:.6g}) m has an interior angle of {angle:.3g} "
-            f"degrees; between {_SHARPEST:g} and {360.0 - _SHARPEST:g} are allowed; cut it off",
-            (place.real, place.imag),
-            angle=angle,
+            f"degrees; between {_SHARPEST:g} and {360.0 - _SHARPEST:g} are allowed; cut it off"
         )
 
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from shapely import MultiPolygon, Point, Polygon, affinity, box, union_all
 
-from coop_drake.errors import FieldError, UnmappableError
+from coop_drake.errors import FieldError
 from coop_drake.harmonic_maps import HarmonicMap, MapStore, VelocityField, solve, trace_streamlines
 from coop_drake.harmonic_maps.evaluate import (
     ON_BOUNDARY,
@@ -181,21 +181,15 @@ def test_ends_of_a_collinear_goal_arc_stay_vertices():
 
 def test_rings_that_touch_are_refused_with_their_place():
     touching = ROOM.difference(Polygon([(2, 0), (2.5, 0.5), (1.5, 0.5)]))
-    with pytest.raises(UnmappableError, match=r"touches another at \(2, 0\) m") as caught:
+    with pytest.raises(FieldError, match=r"touches another at \(2, 0\) m"):
         outline(touching, Point(1, 1))
-    assert caught.value.place == (2.0, 0.0)
-    assert caught.value.width == 0.0
-    assert caught.value.angle is None
 
 
 @pytest.mark.parametrize("shape", [domains.needle(0.9), domains.blade(359.1)], ids=["needle", "blade"])
 def test_corners_sharper_than_a_degree_are_refused_with_their_angle(shape):
     domain, goal = shape
-    with pytest.raises(UnmappableError, match="has an interior angle of") as caught:
+    with pytest.raises(FieldError, match=r"corner at \(.*\) m has an interior angle of (0\.9|359)"):
         outline(domain, goal)
-    assert min(caught.value.angle, 360 - caught.value.angle) == pytest.approx(0.9)
-    assert Point(caught.value.place).distance(domain.boundary) < 1e-9
-    assert caught.value.width is None
 
 
 CRATE = box(1.5, 0.7, 2.5, 1.3)
