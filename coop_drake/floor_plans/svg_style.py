@@ -239,16 +239,8 @@ _PSEUDO |= {"not", "is", "where", "hover", "active", "focus", "focus-visible", "
 """Pseudo-classes that the library of selectors decides as SVG does; the last ones never hold on paper."""
 
 _XHTML = "{http://www.w3.org/1999/xhtml}"
-_LENGTH = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
-_ARGUMENTS = {"matrix": ((6,), ""), "translate": ((1, 2), "px"), "translatex": ((1,), "px")}
-_ARGUMENTS |= {"translatey": ((1,), "px"), "scale": ((1, 2), ""), "scalex": ((1,), ""), "scaley": ((1,), "")}
-_ARGUMENTS |= {"rotate": ((1,), "deg"), "skewx": ((1,), "deg"), "skewy": ((1,), "deg")}
-"""Functions of the property ``transform``: how many numbers they take, and in which unit."""
-
-_AS_ATTRIBUTE = {"translatex": "translate({0}, 0)", "translatey": "translate(0, {0})"}
-_AS_ATTRIBUTE |= {"scalex": "scale({0}, 1)", "scaley": "scale(1, {0})"}
-_AS_ATTRIBUTE |= {"skewx": "skewX({0})", "skewy": "skewY({0})"}
-"""The same functions in the words of the attribute ``transform``."""
+_NOT_TURNED = ("none", "inherit", "initial", "unset")
+"""What a style may say of ``transform``; its functions are read as an attribute alone."""
 
 
 class _Said(NamedTuple):
@@ -304,7 +296,10 @@ class Cascade:
         for important in (False, True):
             for name, text, is_important in (*sheets, *own):
                 if is_important == important:
-                    said[name] = _transform(text, self._file, place) if name == "transform" else text
+                    if name == "transform" and text.strip().lower() not in _NOT_TURNED:
+                        remedy = "apply it in the drawing program, or state it as the attribute transform"
+                        raise self._refuse(place, f"the property transform: {text} is not read", remedy)
+                    said[name] = text
         self._check(element, said, place)
         return {name: self._computed(name, said, outer, place) for name in INITIAL}
 
@@ -430,7 +425,7 @@ def _opacity_of_colour(paint: str) -> float:
 
 def opacity(text: str) -> float:
     """Return an opacity from 0 to 1; a text that is none does not count, and is 1."""
-    match = re.fullmatch(rf"({_LENGTH})(%?)", text)
+    match = re.fullmatch(rf"({NUMBER})(%?)", text)
     value = float(match[1]) / (100.0 if match[2] else 1.0) if match else 1.0
     return min(max(value, 0.0), 1.0)
 
@@ -442,27 +437,3 @@ def _pseudo(tokens: Any) -> Iterator[str]:
             yield token.lower_value if token.type == "ident" else token.lower_name
         for inside in (getattr(token, "arguments", None), getattr(token, "content", None)):
             yield from _pseudo(inside or [])
-
-
-def _transform(text: str, file: str, place: str) -> str:
-    """Return the property ``transform``, whose numbers have units, in the words of the attribute.
-
-    Raises:
-        FloorPlanError: It has a function or a unit that is not read.
-    """
-    if text.strip().lower() in ("none", "inherit", "initial", "unset"):
-        return text
-    parts = []
-    for name, inside in re.findall(r"([A-Za-z]+)\(([^()]*)\)", text):
-        counts, unit = _ARGUMENTS.get(name.lower(), ((), ""))
-        numbers = [one for one in re.split(r"\s*,\s*", inside.strip()) if one]
-        known = [re.fullmatch(rf"({_LENGTH}){unit}|[-+]?0", one, re.IGNORECASE) for one in numbers]
-        if len(numbers) not in counts or not all(known):
-            break
-        values = [match[1] or "0" for match in known if match]
-        joined = f"{name.lower()}({', '.join(values)})"
-        parts.append(_AS_ATTRIBUTE.get(name.lower(), joined).format(*values))
-    if re.sub(r"[A-Za-z]+\([^()]*\)|\s", "", text) or len(parts) != text.count("("):
-        remedy = "apply it in the drawing program, or state it as the attribute transform"
-        raise FloorPlanError(file, place, f"the property transform: {text} is not read", remedy)
-    return " ".join(parts)
