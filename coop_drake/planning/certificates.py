@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from functools import partial, reduce
-from itertools import combinations, product
+from itertools import product
 
 import numpy as np
 import shapely
@@ -170,10 +170,6 @@ GROWTHS = (1e-3, 1e-4, 1e-5, 0.0, -5e-7)
 faster the check. The last one takes back half of the tolerance by which the planner grows cells, for cells
 that merely touch."""
 
-GROWN_SHARE = 0.25
-"""Share of the distance between regions by which cells of these are grown at most [-]: at half of it they
-would touch, and witnesses hold a little less than the pieces."""
-
 TOUCHING = 1e-6
 """Cells nearer to each other than this count as touching, as they do for the verifier [m]."""
 
@@ -210,11 +206,6 @@ def slices_proof(
 
     start, goal, room = Point(question.start[:2]), Point(question.goal_pose[:2]), question.position_tolerance
     floor = Floor(FreeSpace.over(question.workspace))
-    try:
-        polygons = {leaf: [to_polygon(region.section) for region in its] for leaf, its in regions.items()}
-        most = GROWN_SHARE * _Graph(polygons, joined, start, starts).apart(goal, room, goals)
-    except FAILURES:
-        most = max(GROWTHS)
 
     def separated(growth: float) -> list[OverSlice] | None:
         shown, cells = dict[int, tuple[Witness, ...]](), dict[int, list[Polygon]]()
@@ -226,7 +217,7 @@ def slices_proof(
             left = [] if overlaps else floor.not_forbidden(shown[leaf])
             squeezes[leaf], left = witnesses.squeezed(intervals, left, beyond)
             cells[leaf] = _grown(left, growth)
-        labels = _Graph(cells, joined, start, starts).reached
+        labels = _reached(cells, joined, start, starts)
         if any(
             label and cell.dwithin(goal, room + TOUCHING)
             for leaf in goals
@@ -243,7 +234,7 @@ def slices_proof(
             for leaf in leaves
         ]
 
-    for growth in (growth for growth in GROWTHS if growth <= most):
+    for growth in GROWTHS:
         try:
             parts = separated(growth)
         except FAILURES:
@@ -291,65 +282,39 @@ def _grown(regions: Sequence[Region], growth: float) -> list[Polygon]:
     return sorted(parts, key=lambda part: (part.bounds, part.area))
 
 
-class _Graph:
-    """Cells, joined where those of neighbouring leaves touch.
+def _reached(
+    cells: Mapping[int, Sequence[Polygon]],
+    joined: Mapping[int, Sequence[int]],
+    start: Point,
+    starts: set[int],
+) -> dict[int, list[bool]]:
+    """For each leaf which of its cells touching cells of neighbouring leaves join to the start.
 
     Args:
         cells: The cells of every leaf by its id.
         joined: For each leaf those of its neighbours whose id is higher.
         start: Where paths begin.
         starts: Leaves that hold the angles at the start.
-
-    Attributes:
-        reached: For each leaf which of its cells a sequence of touching cells joins to the start.
     """
+    import networkx as nx  # Plans do not need it, and its import takes a tenth of a second.
 
-    def __init__(
-        self,
-        cells: Mapping[int, Sequence[Polygon]],
-        joined: Mapping[int, Sequence[int]],
-        start: Point,
-        starts: set[int],
-    ) -> None:
-        import networkx as nx  # Plans do not need it, and its import takes a tenth of a second.
-
-        numbers = iter(range(sum(map(len, cells.values()))))
-        self._places = {leaf: [next(numbers) for _ in its] for leaf, its in cells.items()}
-        self._polygons = np.array([cell for its in cells.values() for cell in its], dtype=object)
-        beside = [
+    numbers = iter(range(sum(map(len, cells.values()))))
+    places = {leaf: [next(numbers) for _ in its] for leaf, its in cells.items()}
+    polygons = np.array([cell for its in cells.values() for cell in its], dtype=object)
+    beside = np.array(
+        [
             pair
             for leaf, others in joined.items()
             for other in others
-            for pair in product(self._places[leaf], self._places[other])
-        ]
-        self._beside = np.array(beside, dtype=np.int64).reshape(-1, 2)
-        self._first = np.array([k for leaf in sorted(starts) for k in self._places[leaf]], dtype=np.int64)
-        self._start = start
-        graph: nx.Graph[int] = nx.Graph()
-        first = self._first[shapely.dwithin(self._polygons[self._first], start, TOUCHING)].tolist()
-        graph.add_nodes_from(first)
-        one, other = self._polygons[self._beside.T]
-        touching = shapely.dwithin(one, other, TOUCHING)
-        graph.add_edges_from(self._beside[touching].tolist())
-        reached = set[int]().union(*(nx.node_connected_component(graph, k) for k in first))
-        self.reached = {leaf: [k in reached for k in its] for leaf, its in self._places.items()}
-
-    def apart(self, goal: Point, room: float, goals: set[int]) -> float:
-        """Twice the least growth of all cells that would join the start to a goal or to further cells [m].
-
-        Args:
-            goal: Where paths end.
-            room: How far from there they may end [m].
-            goals: Leaves that hold the angles at the goal.
-        """
-        labels = np.array([label for its in self.reached.values() for label in its], dtype=bool)
-        inside = [pair for its in self._places.values() for pair in combinations(its, 2)]
-        pairs = np.concatenate((self._beside, np.array(inside, dtype=np.int64).reshape(-1, 2)))
-        pairs = pairs[labels[pairs[:, 0]] != labels[pairs[:, 1]]]
-        ends = [k for leaf in sorted(goals) for k in self._places[leaf] if labels[k]]
-        new = self._first[~labels[self._first]]
-        one, other = self._polygons[pairs.T]
-        between = shapely.distance(one, other)
-        to_goal = shapely.distance(self._polygons[ends], goal) - room
-        to_start = shapely.distance(self._polygons[new], self._start)
-        return float(np.concatenate((between, 2.0 * to_goal, 2.0 * to_start)).min(initial=np.inf))
+            for pair in product(places[leaf], places[other])
+        ],
+        dtype=np.int64,
+    ).reshape(-1, 2)
+    begins = np.array([k for leaf in sorted(starts) for k in places[leaf]], dtype=np.int64)
+    first = begins[shapely.dwithin(polygons[begins], start, TOUCHING)].tolist()
+    graph: nx.Graph[int] = nx.Graph()
+    graph.add_nodes_from(first)
+    one, other = polygons[beside.T]
+    graph.add_edges_from(beside[shapely.dwithin(one, other, TOUCHING)].tolist())
+    reached = set[int]().union(*(nx.node_connected_component(graph, k) for k in first))
+    return {leaf: [k in reached for k in its] for leaf, its in places.items()}

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
 from functools import partial
@@ -44,6 +44,9 @@ if TYPE_CHECKING:
 
 FINER_ATTEMPTS = 2
 """Number of further searches after a path that cannot be executed, each with half the margin."""
+
+_FAILURES = (GeometryError, PlanError, StallError, ShapelyError)
+"""What is raised where no plan can be made along a way."""
 
 AGE_FACTORS = (1.0, 1.5, 2.0, 3.0, 4.5, SLOWEST_AGE)
 """Gains are tried for so many times the age of the gain set's commands until no limit of acceleration acts
@@ -128,10 +131,13 @@ def _answer(
         way, asked = answer, ended(question, answer)
         make = partial(_made, asked, gain_set, gain_set_name, budget)
         try:
-            made = _finished(partial(make, answer), progress)
+            try:
+                made = make(answer, progress)
+            except PatienceError:  # The way is certified: its plan is finished.
+                made = make(answer, None)
         except TooSlowError as error:  # Other cells do not help.
             return Undecided(str(error), report)
-        except (GeometryError, PlanError, StallError, ShapelyError) as error:
+        except _FAILURES as error:
             stall = f"a free path exists, but a plan along it cannot be executed: {error}"
             too_quick = isinstance(error, TooQuickError)
             if answer.margin == 0.0 or too_quick:
@@ -154,16 +160,36 @@ def _found(
     began: float,
     progress: Progress | None,
 ) -> Found | Undecided:
-    """The quickest of a plan and of those along further paths; Undecided if all are beyond the budget."""
-    plans = [made] if isinstance(made, Plan) else []
-    times = [thread_time() - began]
-    for other in quicker_plans(way, made, make, problem.settings.effort, progress):
-        plans.append(other)
-        times.append(thread_time() - began)
-    if not (isinstance(made, Plan) or plans):
+    """The quickest of a plan and of those along other sampled paths, while the effort asked for lasts.
+
+    The first plan has taken 1 of the effort, and every other path takes at most 1. A way that was found
+    without a path has no others. If ``progress`` raises PatienceError, no further path is tried.
+
+    Returns:
+        The plan; Undecided if all are beyond the budget.
+    """
+    best = made if isinstance(made, Plan) else None
+    times = [] if best is None else [(thread_time() - began, plan_time(best))]
+    effort = problem.settings.effort
+    for number in range(1, ceil(effort)):
+        if isinstance(way, Channel):
+            break
+        if progress is not None:
+            so_far = f"; the transport takes {times[-1][1]:.1f} s so far" if times else ""
+            try:
+                progress(f"trying another path{so_far}", number / effort)
+            except PatienceError:
+                break
+        with suppress(*_FAILURES):
+            other = way.another(number, min(1.0, effort - number))
+            new = None if other is None else make(other)
+            if isinstance(new, Plan) and (best is None or plan_time(new) < plan_time(best)):
+                best = new
+                times.append((thread_time() - began, plan_time(new)))
+    if best is None:
+        assert not isinstance(made, Plan)
         return Undecided(made.describe(), report)
-    improvements = tuple(zip(times[-len(plans) :], map(plan_time, plans), strict=True))
-    return Found(plans[-1], replace(report, improvements=improvements))
+    return Found(best, replace(report, improvements=tuple(times)))
 
 
 def _without_limits(
@@ -176,7 +202,7 @@ def _without_limits(
     asked = ended(problem, found)
     try:
         made = quickest_plan(without_limits(asked), found, gain_set, gain_set_name=name)
-    except (GeometryError, PlanError, StallError, ShapelyError):
+    except _FAILURES:
         return None
     broken = refusals(asked, made)
     return _stated(problem, replace(made, age_factor=factor, refused_by=broken)) if broken else None
@@ -202,16 +228,6 @@ def _turned(goal: float, near: float) -> float:
     """A goal on a circle after whole turns, nearest to where a plan ends, that itself if rounded [rad]."""
     away = nearest_turn(goal - near)
     return near if abs(away) <= SAME_END else near + away
-
-
-def _finished(
-    make: Callable[[Progress | None], Plan | BeyondBudget], progress: Progress | None
-) -> Plan | BeyondBudget:
-    """Make a plan along a certified way, and finish it although ``progress`` has lost its patience."""
-    try:
-        return make(progress)
-    except PatienceError:
-        return make(None)
 
 
 def _made(
@@ -323,51 +339,3 @@ def _added(before: SearchReport, latest: SearchReport) -> SearchReport:
         slices=before.slices + latest.slices,
         first_plan_cpu_seconds=latest.first_plan_cpu_seconds if first is None else first,
     )
-
-
-# Plans along further paths: while the effort that was asked for lasts, the quickest plan is kept.
-
-
-def quicker_plans(
-    found: Channel | CoveredPath,
-    first: object,
-    make: Callable[[CoveredPath], object],
-    effort: float,
-    progress: Progress | None,
-) -> Iterator[Plan]:
-    """Yield plans along other sampled paths, each of them quicker than all before it.
-
-    Args:
-        found: The path of the first plan; a channel that was found without a path has no further ones.
-        first: The first plan, or what there is instead of one.
-        make: Makes a plan along a path; what it returns that is no plan, or raises, is passed over.
-        effort: As in ``PlannerSettings``; the first plan has taken 1, and every other path takes at most 1.
-        progress: Called with the best estimate and the fraction of the effort that is spent. If it raises
-            PatienceError, no further path is tried.
-    """
-    if not isinstance(found, CoveredPath):
-        return
-    best = plan_time(first) if isinstance(first, Plan) else inf
-    for number in range(1, ceil(effort)):
-        if progress is not None:
-            so_far = f"; the transport takes {best:.1f} s so far" if best < inf else ""
-            try:
-                progress(f"trying another path{so_far}", number / effort)
-            except PatienceError:
-                return
-        made = _tried(found, make, number, min(1.0, effort - number))
-        if made is not None and plan_time(made) < best:
-            best = plan_time(made)
-            yield made
-
-
-def _tried(
-    found: CoveredPath, make: Callable[[CoveredPath], object], number: int, share: float
-) -> Plan | None:
-    """Return the plan along another path, None if there is none."""
-    try:
-        other = found.another(number, share)
-        made = None if other is None else make(other)
-    except (GeometryError, PlanError, StallError, ShapelyError):
-        return None
-    return made if isinstance(made, Plan) else None

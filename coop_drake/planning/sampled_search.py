@@ -25,6 +25,7 @@ from coop_drake.planning.questions import (
     within_limits,
 )
 from coop_drake.planning.sampling.band import (
+    BODY_GAP,
     another_candidate,
     best_candidate,
     kept_margin,
@@ -40,36 +41,25 @@ from coop_drake.tree.component_tree import configuration_scale
 
 # What comes of one attempt to sample a path and to cover it with boxes.
 
-FEW_SAMPLES = 4_000
-"""Samples for every subsystem in the first attempt; enough for most floors, at a tenth of a second."""
+FEW_SAMPLES, MANY_SAMPLES = 4_000, 16_000
+"""Samples for every subsystem in the first attempts, enough for most floors at a tenth of a second, and in
+those that follow, about a second each."""
 
 LIGHT_ATTEMPTS = 4
 """Attempts with few samples, before those with many begin."""
 
-MANY_SAMPLES = 16_000
-"""Samples for every subsystem in later attempts, about a second each."""
-
-LARGEST_SHARE = 2
-"""So many times as many are drawn at most [-]: twice as many take three times as long."""
+SHARES = (1, 1, 2)
+"""Attempts draw so many times as many, in turns [-]: twice as many take three times as long."""
 
 
 def samples_of_attempt(number: int) -> int:
     """Samples for every subsystem in an attempt, counted from 1: few at first, then many."""
     if number <= LIGHT_ATTEMPTS:
-        return FEW_SAMPLES * luby(number)
-    return MANY_SAMPLES * min(luby(number - LIGHT_ATTEMPTS), LARGEST_SHARE)
-
-
-def luby(number: int) -> int:
-    """Luby's sequence of budgets for restarts, 1 1 2 1 1 2 4 and so on, counted from 1."""
-    size = int(np.log2(number + 1))
-    return 1 << size - 1 if number + 1 == 1 << size else luby(number + 1 - (1 << size))
+        return FEW_SAMPLES * SHARES[(number - 1) % len(SHARES)]
+    return MANY_SAMPLES * SHARES[(number - LIGHT_ATTEMPTS - 1) % len(SHARES)]
 
 
 # Search through passages that are too narrow for samples: paths on larger floors are repaired.
-
-BODY_GAP = 0.01
-"""Distance that paths keep between bodies of the team [m]."""
 
 FLOOR_GROWTHS, SEEDS_PER_GROWTH = (0.1, 0.06, 0.03), 2
 """Amounts by which walls are moved back for paths through narrow passages [m], largest first because these
@@ -267,20 +257,20 @@ class SampledSearch:
         Returns:
             The path moved; the first one if the moved one cannot be covered.
         """
-        near = best_candidate(self._problem, self._hierarchy, first.path, BODY_GAP, share)
+        near = best_candidate(self._problem, self._hierarchy, first.path, share)
         return self._moved(near, share) or first
 
     def another(self, number: int, share: float) -> CoveredPath | None:
         """Find another path by other samples; see ``CoveredPath``."""
         try:
-            near = another_candidate(self._problem, self._hierarchy, BODY_GAP, number, share)
+            near = another_candidate(self._problem, self._hierarchy, number, share)
             return None if near is None else self._moved(near, share)
         except (GeometryError, ShapelyError):
             return None
 
     def _moved(self, near: FloatArray, share: float) -> CoveredPath | None:
         """Move a path away from the walls, and cover it."""
-        path = moved_from_obstacles(self._problem, near, BODY_GAP, share)
+        path = moved_from_obstacles(self._problem, near, share)
         return self._covered(path, kept_margin(self._problem, path))
 
     def _covered(

@@ -116,26 +116,15 @@ def find_path(
         proof, slices = blocked_goal(problem)
         return NoChannel(True, beyond, proof), SearchReport(slices)
     unit = usual_unit(problem.tree)
-    if unit == 1.0:
-        return _answered(problem, progress, watch, route=route)
-    scale = Rescaling(problem, unit)
-    question, seen = scale.question(), scale.watched(watch)
-    route = None if route is None else route / unit
-    answer, report = _answered(question, progress, seen, unit, route=route)
-    return scale.answer(answer), report
-
-
-def _answered(
-    problem: PlanningProblem,
-    progress: Progress | None,
-    watch: Watch | None,
-    unit: float = 1.0,
-    *,
-    route: FloatArray | None,
-) -> tuple[CoveredPath | Channel | NoChannel, SearchReport]:
+    scale = None if unit == 1.0 else Rescaling(problem, unit)
+    question, seen = (problem, watch) if scale is None else (scale.question(), scale.watched(watch))
+    answer: CoveredPath | Channel | NoChannel
     if problem.settings.strategy != "portfolio":
-        return search_by_cells(problem, progress, watch)
-    return _Search(problem, progress, watch, unit, route=route).run()
+        answer, report = search_by_cells(question, progress, seen)
+    else:
+        route = None if route is None else route / unit
+        answer, report = _Search(question, progress, seen, unit, route=route).run()
+    return (answer if scale is None else scale.answer(answer)), report
 
 
 class _Search:

@@ -13,12 +13,10 @@ from manifold3d import CrossSection, FillRule
 from coop_drake.answers.problem import PlanningProblem, at_goal
 from coop_drake.geometry.polygons import polygon_rings
 from coop_drake.geometry.swept_tree import Intervals
-from coop_drake.planning.cells.as_printed import PaperExploration
 from coop_drake.planning.cells.cells import Region
 from coop_drake.planning.cells.exploration import (
     ChannelSearched,
     Event,
-    Exploration,
     ExplorationBegan,
     ExplorationEnded,
     ExplorationResumed,
@@ -88,35 +86,20 @@ class SearchRecording:
 def record_search(
     problem: PlanningProblem, strategy: Strategy, progress: Progress | None = None
 ) -> SearchRecording:
-    """Search for a plan, and record every event of the search.
+    """Search for a plan, and record every event of the search; of a portfolio also the boxes, one by one.
 
     The problem's settings give the budget of slices.
     """
-    if strategy == "portfolio":
-        return _record_portfolio(problem, progress)
     events: list[Event] = []
-    algorithm = Exploration if strategy == "cells" else PaperExploration
-    exploration = algorithm(problem, None, events.append)
-    budget = problem.settings.max_slices
-
-    def count(slices: int) -> None:
-        if progress is not None:
-            progress(f"{slices} slices", slices / budget)
-
-    outcome = exploration.run(budget, count)
-    return SearchRecording(problem, tuple(events), outcome.verdict)
-
-
-def _record_portfolio(problem: PlanningProblem, progress: Progress | None) -> SearchRecording:
-    """Record the proofs of infeasibility, then the boxes of the channel one by one."""
-    events: list[Event] = []
-    asked = replace(problem, settings=replace(problem.settings, strategy="portfolio"))
+    asked = replace(problem, settings=replace(problem.settings, strategy=strategy))
     answer, _ = find_channel(asked, progress, watch=events.append)
+    last = events[-1] if events else None
+    if strategy != "portfolio" and isinstance(last, ExplorationEnded):
+        return SearchRecording(problem, tuple(events), Verdict(last.verdict))
     if isinstance(answer, Channel):
         events += _box_events(answer, tuple(sorted({joint.robot for joint in problem.tree.joints})))
         return SearchRecording(problem, tuple(events), Verdict.FOUND)
     verdict = Verdict.INFEASIBLE if answer.proved else Verdict.BUDGET
-    last = events[-1] if events else None
     if not (isinstance(last, ExplorationEnded) and last.verdict == verdict.value):
         events += [ExplorationBegan(answer.reason, ()), ExplorationEnded(verdict.value, 0)]
     return SearchRecording(problem, tuple(events), verdict, answer.reason)

@@ -23,7 +23,7 @@ from coop_drake.planning.cells.cells import Squeezes
 from coop_drake.planning.cells.exploration import Exploration, Verdict
 from coop_drake.planning.channel import CoveredPath, NoChannel
 from coop_drake.planning.duration import plan_time
-from coop_drake.planning.planner import plan, quicker_plans
+from coop_drake.planning.planner import plan
 from coop_drake.planning.proofs import MANY_CORNERS, Proofs, clearance_bound, refuted_at_an_end
 from coop_drake.planning.questions import relaxed
 from coop_drake.planning.rescaling import Rescaling
@@ -176,8 +176,13 @@ def test_only_quicker_plans_are_kept_and_shown():
         return latest
 
     found = CoveredPath(np.zeros((2, 3)), 0.0, bool, another)
-    quicker = quicker_plans(found, lasting(10.0), make, 4.5, lambda phase, fraction: told.append(phase))
-    assert [plan_time(one) for one in quicker] == [9.0]
+    asked = replace(problem, settings=replace(problem.settings, effort=4.5))
+    result = planner._found(
+        asked, found, lasting(10.0), make, SearchReport(0), 0.0, lambda phase, share: told.append(phase)
+    )
+    assert isinstance(result, Found)
+    assert plan_time(result.plan) == 9.0
+    assert [seconds for _, seconds in result.report.improvements] == [10.0, 9.0]
     assert asked_for == [(1, 1.0), (2, 1.0), (3, 1.0), (4, 0.5)]
     assert all("10.0 s so far" in phase for phase in told)
 

@@ -312,7 +312,7 @@ def test_the_clearance_is_what_shapely_measures(problem, bent):
 
 
 def test_a_path_is_moved_from_the_walls_and_stays_free(problem, bent):
-    wide = moved_from_obstacles(problem, bent, 0.01)
+    wide = moved_from_obstacles(problem, bent)
     np.testing.assert_array_equal(wide[[0, -1]], bent[[0, -1]])
     assert clearance(problem, wide) > 3.0 * clearance(problem, bent)
     assert estimated_duration(problem, wide) < estimated_duration(problem, bent)
@@ -321,7 +321,7 @@ def test_a_path_is_moved_from_the_walls_and_stays_free(problem, bent):
 
 
 def test_a_margin_keeps_to_the_paths_clearance_and_to_what_is_asked(problem, bent):
-    wide = moved_from_obstacles(problem, bent, 0.01)
+    wide = moved_from_obstacles(problem, bent)
     assert 0.0 < kept_margin(problem, wide) <= problem.settings.margin
     assert kept_margin(problem, wide) < path_clearance(problem, wide, 1.0)
     least = replace(problem, settings=replace(problem.settings, margin=0.01))

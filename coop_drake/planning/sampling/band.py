@@ -298,6 +298,9 @@ def _speeds(tree: ComponentTree) -> FloatArray:
 
 # Paths with clearance: the best of some candidates, moved away from the walls and then straightened.
 
+BODY_GAP = 0.01
+"""Distance that paths keep between bodies of the team [m]."""
+
 LEAST_CLEARANCE = 0.002
 """Clearance that candidates keep [m], as paths of the first attempts do."""
 
@@ -337,7 +340,7 @@ more does not matter [-]."""
 
 
 def best_candidate(
-    problem: PlanningProblem, hierarchy: SubsystemHierarchy, known: FloatArray, gap: float, share: float = 1.0
+    problem: PlanningProblem, hierarchy: SubsystemHierarchy, known: FloatArray, share: float = 1.0
 ) -> FloatArray:
     """The path with the shortest estimated duration among a known one and sampled ones.
 
@@ -348,74 +351,70 @@ def best_candidate(
         problem: The question.
         hierarchy: Its subsystems.
         known: A free path, circular axes unwrapped, shape (m, 3 + n) [m, rad].
-        gap: Smallest distance between bodies of the team [m].
         share: Share of ``CANDIDATES`` that is sampled [-].
     """
-    sampler = Sampler(hierarchy, marginal_workspace(problem, SAMPLED_CLEARANCE), gap, CANDIDATE_SEED)
+    sampler = Sampler(hierarchy, marginal_workspace(problem, SAMPLED_CLEARANCE), BODY_GAP, CANDIDATE_SEED)
     most = round(share * CANDIDATES)
     sampled = [*takewhile(len, (sampler.path(CANDIDATE_SAMPLES, CHOICES) for _ in range(most)))]
     if len(sampled) < most and len(problem.goal_joints) > FEW_JOINTS:
         sampled += filter(len, (sampler.direct_path(OTHER_SAMPLES) for _ in range(most - len(sampled))))
-    return _quickest(problem, [known, *sampled], gap)
+    return _quickest(problem, [known, *sampled])
 
 
 def another_candidate(
-    problem: PlanningProblem, hierarchy: SubsystemHierarchy, gap: float, number: int, share: float
+    problem: PlanningProblem, hierarchy: SubsystemHierarchy, number: int, share: float
 ) -> FloatArray | None:
     """The path with the shortest estimated duration among sampled ones, None if none is found.
 
     Args:
         problem: The question.
         hierarchy: Its subsystems.
-        gap: Smallest distance between bodies of the team [m].
         number: Other samples are drawn for every number (1, 2, ...).
         share: Share of ``OTHER_CANDIDATES`` that is sampled [-], at least one.
     """
-    sampler = Sampler(hierarchy, marginal_workspace(problem, SAMPLED_CLEARANCE), gap, CANDIDATE_SEED + number)
+    sampler = Sampler(
+        hierarchy, marginal_workspace(problem, SAMPLED_CLEARANCE), BODY_GAP, CANDIDATE_SEED + number
+    )
     sampled = (sampler.direct_path(OTHER_SAMPLES) for _ in range(max(1, round(share * OTHER_CANDIDATES))))
     paths = [path for path in sampled if len(path)]
-    return _quickest(problem, paths, gap) if paths else None
+    return _quickest(problem, paths) if paths else None
 
 
-def _quickest(problem: PlanningProblem, paths: list[FloatArray], gap: float) -> FloatArray:
+def _quickest(problem: PlanningProblem, paths: list[FloatArray]) -> FloatArray:
     """The path with the shortest estimated duration after a short smoothing."""
-    tight = [smoothed(problem, path, LEAST_CLEARANCE, 0.0, gap, moves=COMPARED_MOVES) for path in paths]
+    tight = [smoothed(problem, path, LEAST_CLEARANCE, 0.0, BODY_GAP, moves=COMPARED_MOVES) for path in paths]
     return min(tight, key=lambda path: estimated_duration(problem, path))
 
 
-def moved_from_obstacles(
-    problem: PlanningProblem, path: FloatArray, gap: float, share: float = 1.0
-) -> FloatArray:
+def moved_from_obstacles(problem: PlanningProblem, path: FloatArray, share: float = 1.0) -> FloatArray:
     """Move a path away from the walls, and straighten it such that it keeps most of that clearance.
 
     Args:
         problem: The question.
         path: A free path, circular axes unwrapped, shape (m, 3 + n) [m, rad].
-        gap: Smallest distance between bodies of the team [m].
         share: Share of the usual number of moves that is tried [-].
     """
     most = problem.settings.margin / LEAST_FRACTION
     path = smoothed(
-        problem, path, LEAST_CLEARANCE, 0.0, gap, moves=round(share * WIDE_MOVES), price=WIDE_PRICE
+        problem, path, LEAST_CLEARANCE, 0.0, BODY_GAP, moves=round(share * WIDE_MOVES), price=WIDE_PRICE
     )
     clearance = max(KEPT_FRACTION * path_clearance(problem, path, most), LEAST_CLEARANCE)
     for spacing, moves in STRAIGHTENINGS:
-        path = smoothed(problem, path, clearance, clearance, gap, spacing, round(share * moves))
-    return centred_in_narrow_passages(problem, path, gap)
+        path = smoothed(problem, path, clearance, clearance, BODY_GAP, spacing, round(share * moves))
+    return centred_in_narrow_passages(problem, path)
 
 
-def centred_in_narrow_passages(problem: PlanningProblem, path: FloatArray, gap: float) -> FloatArray:
+def centred_in_narrow_passages(problem: PlanningProblem, path: FloatArray) -> FloatArray:
     """Move a path with less clearance than ``NARROW`` to the middle of its passages; others stay the same.
 
     Args:
         problem: The question.
         path: A free path, circular axes unwrapped, shape (m, 3 + n) [m, rad].
-        gap: Smallest distance between bodies of the team [m].
     """
     clearance = path_clearance(problem, path, NARROW)
     for _ in range(NARROW_REPEATS if 0.0 < clearance < NARROW else 0):
         kept = NARROW_KEPT_FRACTION * clearance
-        wider = smoothed(problem, path, kept, 0.0, gap, NARROW_SPACING, NARROW_MOVES, WIDE_PRICE)
+        wider = smoothed(problem, path, kept, 0.0, BODY_GAP, NARROW_SPACING, NARROW_MOVES, WIDE_PRICE)
         reached = path_clearance(problem, wider, NARROW)
         if reached <= clearance:
             break

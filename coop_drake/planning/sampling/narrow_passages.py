@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +21,7 @@ from coop_drake.tree.arrays import FloatArray, IntArray
 from coop_drake.tree.component_tree import TeamArrays, configuration_scale, moved, place_into
 
 if TYPE_CHECKING:
-    from scipy.optimize import LinearConstraint
+    from scipy.sparse import csr_array
 
 # Distances between what is near each other along a path, and how they change with the configurations.
 
@@ -173,7 +173,8 @@ def with_wider_passages(
         most: Largest move of a sample in any scaled axis [m].
         spacing: Largest distance of neighbours in any scaled axis that the moves may lead to [m].
     """
-    from scipy.optimize import Bounds, milp  # Here: its import takes a tenth of a second.
+    from scipy import sparse  # Here: their imports take a tenth of a second.
+    from scipy.optimize import Bounds, LinearConstraint, milp
 
     tree = problem.tree
     team, scale = tree.arrays, configuration_scale(tree)
@@ -188,72 +189,49 @@ def with_wider_passages(
     walls = wall_contacts(team, samples, edges, NEAR)
     bodies = body_contacts(team, samples, NEAR)
     count, axes = samples.shape
-    own, moves = np.arange(count), count * axes
-    rows = _Rows(axes, scale)
-    rows.add_distances(walls, -walls.distances, (own[walls.rows] + moves, -1.0))
-    rows.add_distances(bodies, np.minimum(bodies.distances, BODY_GAP) - bodies.distances)
-    rows.add(np.zeros(count), np.inf, (own, moves + own, 1.0), (own, moves + count, -1.0))
-    rows.add_neighbours(path * scale, chosen, spacing)
+    own, moves = sparse.eye_array(count, format="csr"), count * axes
+    near = chosen[1:] | chosen[:-1]  # Neighbours of which one moves at least.
+    place, sides = np.cumsum(chosen) - 1, (slice(1, None), slice(None, -1))
+    both = [sparse.diags_array(chosen[side][near] * 1.0) @ own[place[side][near]] for side in sides]
+    between = (np.diff(path * scale, axis=0)[near]).ravel()
+    far = np.maximum(spacing, np.abs(between))
+    # Columns are scaled moves, clearances and the least of these.
+    rows = sparse.block_array(
+        [
+            [_changes(walls, scale, count), -own[walls.rows], None],
+            [_changes(bodies, scale, count), None, None],
+            [None, own, sparse.csr_array(-np.ones((count, 1)))],
+            [sparse.kron(both[0] - both[1], sparse.eye_array(axes)), None, None],
+        ],
+        format="csr",
+        dtype=np.float64,
+    )
+    least = [-walls.distances, np.minimum(bodies.distances, BODY_GAP) - bodies.distances, np.zeros(count)]
+    free = np.full(sum(map(len, least)), np.inf)
+    constraint = LinearConstraint(
+        rows, np.concatenate([*least, -far - between]), np.concatenate([free, far - between])
+    )
     lower, upper = np.full((count, axes), -most), np.full((count, axes), most)
     lower[:, 3:] = np.clip((tree.joint_lower - samples[:, 3:]) * scale[3:], -most, 0.0)
     upper[:, 3:] = np.clip((tree.joint_upper - samples[:, 3:]) * scale[3:], 0.0, most)
     widest = np.full(count + 1, WIDE_ENOUGH)
     cost = np.concatenate([np.zeros(moves), np.full(count, -MEAN_WEIGHT / count), [-1.0]])
     bounds = Bounds(np.append(lower, -widest), np.append(upper, widest))
-    solved = milp(cost, bounds=bounds, constraints=rows.constraint(len(cost)))
+    solved = milp(cost, bounds=bounds, constraints=constraint)
     better = path.copy()
     if solved.x is not None:
         better[chosen] += solved.x[:moves].reshape(count, axes) / scale
     return better
 
 
-class _Rows:
-    """Rows of a sparse matrix with bounds; columns are scaled moves, clearances and the least of these."""
+def _changes(contacts: Contacts, scale: FloatArray, count: int) -> csr_array:
+    """How scaled moves of samples change distances, a row for each contact, (M, samples times axes)."""
+    from scipy.sparse import csr_array
 
-    def __init__(self, axes: int, scale: FloatArray) -> None:
-        self._axes, self._scale, self._count = axes, scale, 0
-        self._entries: list[tuple[FloatArray, FloatArray, FloatArray]] = []
-        self._bounds: list[tuple[FloatArray, FloatArray]] = []
-
-    def add(self, lower: FloatArray, upper: FloatArray | float, *entries: tuple[Any, Any, Any]) -> None:
-        """Add rows: bounds, and entries as (row, column, value) with arrays of one shape, or numbers."""
-        for entry in entries:
-            row, column, value = (part.ravel() for part in np.broadcast_arrays(*entry))
-            self._entries.append((row + self._count, column, value))
-        self._bounds.append((lower, np.broadcast_to(upper, lower.shape)))
-        self._count += len(lower)
-
-    def add_distances(self, contacts: Contacts, lower: FloatArray, *others: tuple[Any, Any]) -> None:
-        """Add a row for every contact: how moves change its distance; other entries as (column, value)."""
-        row = np.arange(len(lower))
-        column = contacts.rows[:, None] * self._axes + np.arange(self._axes)
-        changes = (row[:, None], column, contacts.gradients / self._scale)
-        self.add(lower, np.inf, changes, *((row, column, value) for column, value in others))
-
-    def add_neighbours(self, path: FloatArray, chosen: NDArray[np.bool_], spacing: float) -> None:
-        """Add rows that keep neighbours of a scaled path within the spacing, or as far apart as they are."""
-        number = np.cumsum(chosen) - 1
-        apart = np.diff(path, axis=0)
-        for axis in range(self._axes):
-            kept = chosen[1:] | chosen[:-1]
-            between = apart[kept, axis]
-            row, far = np.arange(len(between)), np.maximum(spacing, np.abs(between))
-            entries = [
-                (row[own], number[side][kept][own] * self._axes + axis, sign)
-                for side, sign in ((slice(1, None), 1.0), (slice(None, -1), -1.0))
-                for own in [chosen[side][kept]]
-            ]
-            self.add(-far - between, far - between, *entries)
-
-    def constraint(self, columns: int) -> LinearConstraint:
-        """The rows as a constraint on so many variables."""
-        from scipy.optimize import LinearConstraint
-        from scipy.sparse import csr_array
-
-        row, column, value = (np.concatenate(parts) for parts in zip(*self._entries, strict=True))
-        lower, upper = (np.concatenate(parts) for parts in zip(*self._bounds, strict=True))
-        matrix = csr_array((value, (row, column)), shape=(self._count, columns))
-        return LinearConstraint(matrix, lower, upper)
+    rows, axes = np.arange(len(contacts.rows)), np.arange(len(scale))
+    places = np.broadcast_arrays(rows[:, None], contacts.rows[:, None] * len(scale) + axes)
+    entries = (contacts.gradients / scale).ravel(), tuple(part.ravel() for part in places)
+    return csr_array(entries, shape=(len(rows), count * len(scale)))
 
 
 LEAST_BODY_GAP = 0.002
