@@ -25,7 +25,8 @@ from coop_drake.laws.readiness import interval_margin
 from coop_drake.planning.boxes import BoxArrays, box_arrays, clearances_in_box, longest_box
 from coop_drake.planning.cells.cells import FreeBox
 from coop_drake.planning.channel import Channel, CoveredPath, Regions
-from coop_drake.planning.duration import timed
+from coop_drake.planning.duration import estimated, plan_time, timed
+from coop_drake.planning.limits import NEED_FACTOR, limits_of
 from coop_drake.planning.motion_limits import motion_limits, team_chains, times_at_limits
 from coop_drake.planning.rescaling import Rescaling
 from coop_drake.planning.sampling.collision import ObstacleGrid, grid_inside
@@ -114,19 +115,33 @@ def _quickest(
     if progress is not None:
         progress("choosing boxes", 0.0)
 
-    better = cover_path(problem, path, found.margin, gain_set, room)
-    if better is not None:
+    def covered(limits: FloatArray | None = None) -> Plan | None:
+        better = cover_path(problem, path, found.margin, gain_set, limits, room)
+        if better is None:
+            return None
         try:
             channel, targets = better
             return make_plan(
                 problem, channel, gain_set, gain_set_name=gain_set_name, targets=targets, progress=progress
             )
-        except TooQuickError:  # Other boxes would not be slower.
+        except TooQuickError:  # other boxes would not be slower
             raise
         except (GeometryError, PlanError, StallError, ShapelyError):
-            pass  # The boxes that the search found are proved free too, and their passages may be wider.
+            # The boxes that the search found are proved free too, and their passages may be wider.
+            return None
+
+    plan = covered()
+    if plan is not None:
+        slower = covered(limits_of(plan)) if _is_slowed(plan) else None
+        return plan if slower is None or plan_time(plan) <= plan_time(slower) else slower
     channel = found if isinstance(found, Channel) else found.channel()
     return make_plan(problem, channel, gain_set, gain_set_name=gain_set_name, progress=progress)
+
+
+def _is_slowed(plan: Plan) -> bool:
+    """Whether limits of speed slow a plan down, so that other boxes may be quicker."""
+    limits = limits_of(plan)
+    return limits is not None and bool((NEED_FACTOR * estimated(plan)[1] > limits).any())
 
 
 # Covering a path again: other boxes along it, with which the transport takes less time.
@@ -153,7 +168,7 @@ PADS = (0.005, 0.015, 0.03, 0.06)
 NARROW_PADS = (0.001, 0.003, 0.01, 0.03)
 """Paddings for narrow passages, where the smallest of the others is too wide [rad or m]."""
 
-LEVELS = ((0.3, PADS), (0.1, NARROW_PADS))
+LEVELS = ((0.3, PADS), (0.1, NARROW_PADS), (0.0, NARROW_PADS))
 """Fractions of the margin that waypoints keep [-], and paddings; tried in this order until one works."""
 
 LEAST_CLEARANCE = 2e-3
@@ -175,6 +190,7 @@ def cover_path(
     path: FloatArray,
     margin: float,
     gain_set: GainSet,
+    limits: FloatArray | None = None,
     room: FloatArray | None = None,
 ) -> tuple[Channel, tuple[FloatArray, ...]] | None:
     """Cover a path with boxes such that the transport is fast: few boxes, and narrow ones in narrow passages.
@@ -188,6 +204,8 @@ def cover_path(
         path: Free configurations from start to goal, circular axes unwrapped, shape (m, 3 + n) [m, rad].
         margin: The margin that the path keeps [m].
         gain_set: Gains, fixed or to be scheduled.
+        limits: Largest speed of the object, then largest rates of all axes, shape (2 + n,) [m/s, rad/s or
+            m/s]; None for none.
         room: As ``quickest_plan`` has it.
 
     Returns:
@@ -198,6 +216,7 @@ def cover_path(
     boxes, grid = box_arrays(problem.tree), grid_inside(problem.workspace, problem.tree.reach)
     angle = float(path[-1, 2] + nearest_turn(float(problem.goal_pose[2] - path[-1, 2])))
     goals = np.array(final_intervals(problem, goal_values(problem, angle, path[-1, 2:])))
+    limits = np.full(len(problem.start) - 1, np.inf) if limits is None else limits
     room = np.zeros(len(problem.start) - 1) if room is None else room
     # At a small margin some levels are equal; each is tried once.
     for least_clearance, pads in dict.fromkeys(
@@ -213,8 +232,8 @@ def cover_path(
             steps = np.hypot(*np.diff(points[:, :2], axis=0).T)
         places = np.concatenate([[0.0], np.cumsum(steps)])
         waypoints = Waypoints(
-            boxes, grid, points, places, np.array(pads), goals, schedule_of(gain_set), least,
-            problem.passes, room[1:],
+            boxes, grid, points, places, np.array(pads), goals, schedule_of(gain_set), limits,
+            least, problem.passes, room[1:],
         )  # fmt: skip
         rows, regions = choose_boxes(waypoints), Regions(problem, swept)
         tried = [regions.around(_box(waypoints, *row)) for row in rows.tolist()]
@@ -286,6 +305,7 @@ class Waypoints(NamedTuple):
         pads: Paddings of a box to choose from, shape (p,) [rad or m].
         goals: Lower and upper ends of the last goal intervals, shape (2, m) [rad, m].
         schedule: The rules by which gains are chosen.
+        limits: Largest speed of the object, then largest rates of all axes, shape (1 + m,) [m/s, rad/s].
         least_clearance: Clearance that every waypoint must keep [m].
         passing: Whether the team passes from cell to cell without a stop.
         room: By how much boxes are wider than their paddings at either end of every axis, which a motion does
@@ -299,6 +319,7 @@ class Waypoints(NamedTuple):
     pads: FloatArray
     goals: FloatArray
     schedule: Schedule
+    limits: FloatArray
     least_clearance: float
     passing: bool
     room: FloatArray
@@ -406,7 +427,7 @@ def _travel(waypoints: Waypoints, i: int, j: int, clearances: FloatArray) -> flo
     """
     stiffness, damping, gain = scheduled_governor(waypoints.schedule, clearances.min())
     per_speed = steady_clearance(1.0, stiffness, damping, gain)
-    fastest, seconds = gain * FIELD_SPEED, 0.0
+    fastest, seconds = min(gain * FIELD_SPEED, waypoints.limits[0]), 0.0
     for k in range(j - i):
         clearance = 0.5 * (clearances[k] + clearances[k + 1])
         length = waypoints.places[i + k + 1] - waypoints.places[i + k]
@@ -434,7 +455,7 @@ def _closing(waypoints: Waypoints, i: int, lower: FloatArray, upper: FloatArray,
             continue
         rate = scheduled_axis(
             waypoints.schedule, a > 0, lower[a], upper[a], goals[0, a], goals[1, a], resting, narrowest,
-            np.inf, np.inf,
+            waypoints.limits[1 + a], np.inf,
         )[0]  # fmt: skip
         longest = max(longest, CLOSING / rate)
     return longest

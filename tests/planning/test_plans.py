@@ -242,7 +242,7 @@ def test_the_boxes_chosen_are_the_quickest_of_all_sequences(monkeypatch):
     monkeypatch.setattr(cell_selection, "_closing", closing)
     waypoints = Waypoints(
         SimpleNamespace(lower=np.full(2, -9.0), upper=np.full(2, 9.0)), None, path, path[:, 0], pads,
-        np.array([path[-1, 2:] - 0.1, path[-1, 2:] + 0.1]), schedule_of(ScheduledGains()),
+        np.array([path[-1, 2:] - 0.1, path[-1, 2:] + 0.1]), schedule_of(ScheduledGains()), np.full(3, np.inf),
         0.01, False, np.zeros(2),
     )  # fmt: skip
 
