@@ -336,8 +336,9 @@ def sampled(made: Plan) -> FloatArray:
 def starting_ways(problem: PlanningProblem, made: Plan, team: Team) -> Iterator[tuple[str, FloatArray]]:
     """Yield paths, shape (m, 3 + n): the motion judged, through its cells, and those of other planners."""
     yield "motion", sampled(made)
-    cells, table = motion.cell_sets(made, 0.0), motion_limits(problem.limits)
-    yield "cells", motion.first_points(made, cells, team.chains, table, motion.OVERLAP_SPANS)[:, :-1]
+    cells, table = motion.cell_sets(made, None), motion_limits(problem.limits)
+    ways = motion.first_ways(made)
+    yield "cells", motion.first_points(ways, cells, team.chains, table, motion.OVERLAP_SPANS)[:, :-1]
     # A part of the clearance is enough here: the search mends what a narrow passage lacks.
     at_ends = clearances(team.arrays, team.grid, sampled(made)[[0, -1]], team.clearance).min()
     narrow = replace(problem, workspace=problem.workspace.buffer(-min(team.clearance / 3.0, 0.9 * at_ends)))

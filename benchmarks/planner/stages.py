@@ -73,12 +73,14 @@ def _aimless_plan(*given: Any, targets: object, **others: Any) -> Plan:
 
 def _motion_along_paths(plan: Plan, problem: PlanningProblem, limits: FloatArray, gains: TeamGains) -> Motion:
     """Return a motion with the times of the first phase if the way is not moved in it, only its times are."""
-    chains, cells, table = team_chains(problem), motion.cell_sets(plan, 0.0), motion.LIMIT_SHARE * limits
-    free = np.where([True, True, False], table, inf)
+    chains, cells, table = team_chains(problem), motion.cell_sets(plan, None), motion.LIMIT_SHARE * limits
+    free, ways = np.where([True, True, False], table, inf), motion.first_ways(plan)
     for finer in range(motion.FINER + 1):
-        points = motion.first_points(plan, cells, chains, table, motion.OVERLAP_SPANS * 2**finer)
+        points = motion.first_points(ways, cells, chains, table, motion.OVERLAP_SPANS * 2**finer)
         with suppress(PlanError):
-            program = motion._Program(cells, chains, free, WAITING, points, motion.EVENNESS, parts=1)
+            program = motion._Program(
+                cells, chains, free, WAITING, motion.BRAKE_RAMP, points, motion.EVENNESS, parts=1
+            )
             break
     program.held.reshape(points.shape)[:, :-1] = True
     program.solve(motion.WEIGHTS[0])
