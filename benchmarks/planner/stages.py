@@ -96,7 +96,7 @@ STAGES: dict[str, tuple[Replacement, ...]] = {
     "no_widening": (Replacement(band, "WIDE_MOVES", 0),),
     "no_straightening": (Replacement(band, "STRAIGHTENINGS", ()),),
     "no_improved_path": (
-        Replacement(sampled_search, "moved_from_obstacles", lambda problem, path, gap, share: path),
+        Replacement(sampled_search, "moved_from_obstacles", lambda problem, path, share: path),
     ),
     "no_covering": (Replacement(cell_selection, "cover_path", lambda *asked: None),),
     "no_times_of_boxes": (Replacement(cell_selection, "choose_boxes", _few_wide_boxes),),
