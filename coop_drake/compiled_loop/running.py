@@ -28,8 +28,8 @@ from coop_drake.laws.words import WORD_SIZE, first_motion, first_words
 from coop_drake.plant.team import displacement
 from coop_drake.scenario import Deafness, Deployment, Silence
 from coop_drake.systems.block import READY_SIZE
-from coop_drake.systems.departures import world_departures
-from coop_drake.systems.monitors import LONG_AGO
+from coop_drake.systems.forces import world_departures
+from coop_drake.systems.measurements import LONG_AGO
 from coop_drake.tree.arrays import FloatArray, IntArray
 
 _USES = 8

@@ -4,12 +4,15 @@ from coop_drake.diagram.closed_loop import (
     ClosedLoop,
     Loop,
     TransportStation,
+    World,
+    brakes_of,
     build_closed_loop,
     build_station,
+    build_world,
+    control_period,
 )
 from coop_drake.diagram.deployment import TELEMETRY
 from coop_drake.diagram.robot_controller import Replacements, RobotKnowledge, build_robot_controller
-from coop_drake.diagram.world import World, brakes_of, build_world, control_period
 
 __all__ = [
     "TELEMETRY",

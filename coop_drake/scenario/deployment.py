@@ -2,7 +2,7 @@
 
 This file holds the values alone; :mod:`coop_drake.scenario.checks` refuses values that do not fit
 together. Three files apply them: :mod:`coop_drake.diagram.deployment` puts blocks between every controller
-and the plant, :mod:`coop_drake.systems.departures` has the forces of the world for both loops, and
+and the plant, :mod:`coop_drake.systems.forces` has the forces of the world for both loops, and
 :mod:`coop_drake.diagram.robot_controller` makes the controllers' model of the team, in which
 ``mass_error`` acts. A new departure is a field here, a block there, tests in
 ``tests/diagram/test_deployment.py``, a mild and a harsh case in ``tests/closed_loop/test_departures.py``, a

@@ -29,8 +29,8 @@ from coop_drake.progress import Progress
 from coop_drake.scenario import Scenario
 from coop_drake.simulation.clearance import TeamClearance
 from coop_drake.simulation.telemetry import Invariants, Margins, Sample, Telemetry
-from coop_drake.systems.holds import ASKED, BRAKED, SILENT, TOLD
 from coop_drake.systems.kernels import cell_margin
+from coop_drake.systems.messages import ASKED, BRAKED, SILENT, TOLD
 from coop_drake.tree.arrays import FloatArray
 
 

@@ -1,6 +1,5 @@
 """Thin LeafSystems over the control laws, the velocity fields and the cell planner."""
 
-from coop_drake.systems.actuators import LaggingEffort, LimitedEffort, RobotEffort, WrenchLaw
 from coop_drake.systems.block import (
     CLOCK_SIZE,
     CURRENT_CELL_SIZE,
@@ -11,25 +10,49 @@ from coop_drake.systems.block import (
     robot_record,
     supervisor_record,
 )
-from coop_drake.systems.departures import FloorFriction, Pushes, Sticking, WheelSlips
-from coop_drake.systems.governor import GovernedCell, ReferenceGovernor
-from coop_drake.systems.holds import FunnelClock, HoldMonitor, HoldReceiver, HoldSupervisor
+from coop_drake.systems.forces import (
+    FloorFriction,
+    LaggingEffort,
+    LimitedEffort,
+    Pushes,
+    RobotEffort,
+    Sticking,
+    WheelSlips,
+    WrenchLaw,
+)
 from coop_drake.systems.measurements import (
+    ArrivalMonitor,
+    DepartureMonitor,
     DisturbanceObserver,
     LossyMeasurement,
     MeasurementNoise,
+    MonitoredRobot,
     ObjectEstimator,
     ShiftedMeasurement,
     StatePredictor,
     TeamSensor,
     build_separate_sensor,
 )
-from coop_drake.systems.messages import Exchange, Interruption, MessageChannel, TeamLink
-from coop_drake.systems.monitors import ArrivalMonitor, DepartureMonitor, MonitoredRobot
-from coop_drake.systems.motion import MotionFollower, PassingMonitor
-from coop_drake.systems.ppc import AxisLaw, AxisPpc, axis_laws
-from coop_drake.systems.readiness import CellPlanner, ReadyMonitor
-from coop_drake.systems.words import Radio, RobotWords, WordPlanner
+from coop_drake.systems.messages import (
+    Exchange,
+    FunnelClock,
+    HoldMonitor,
+    HoldReceiver,
+    HoldSupervisor,
+    Interruption,
+    MessageChannel,
+    TeamLink,
+)
+from coop_drake.systems.passing import MotionFollower, PassingMonitor, Radio, RobotWords, WordPlanner
+from coop_drake.systems.resting import (
+    AxisLaw,
+    AxisPpc,
+    CellPlanner,
+    GovernedCell,
+    ReadyMonitor,
+    ReferenceGovernor,
+    axis_laws,
+)
 
 __all__ = [
     "CLOCK_SIZE",

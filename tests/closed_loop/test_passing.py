@@ -35,7 +35,7 @@ from coop_drake.scenario import (
 from coop_drake.scenario.checks import validate
 from coop_drake.scenario.model import RobotLimits, Tolerances
 from coop_drake.simulation import build_maps, simulate
-from coop_drake.systems.words import SAID, RobotWords
+from coop_drake.systems.passing import SAID, RobotWords
 from coop_drake.verification.motion import _movers
 from coop_drake.verification.runs.motion import check_followed
 from coop_drake.verification.runs.rows import Rows

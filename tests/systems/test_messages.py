@@ -10,7 +10,7 @@ from coop_drake import systems
 from coop_drake.laws.axis_table import ENERGY_BOUND, track_row
 from coop_drake.laws.measurements import whole_periods
 from coop_drake.laws.ppc import HOLD_RATE, SETTLING_TIME
-from coop_drake.systems.holds import RELEASE
+from coop_drake.systems.messages import RELEASE
 from tests.support.small_plan import small_plan
 from tests.support.system_checks import context_with, evaluate, port_sizes
 

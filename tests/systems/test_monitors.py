@@ -14,7 +14,7 @@ from coop_drake.laws.readiness import FAR, ArrivalGoal, arrival_margin, mean_sam
 from coop_drake.scenario import Deployment
 from coop_drake.systems import ArrivalMonitor, DepartureMonitor, ReadyMonitor, axis_laws
 from coop_drake.systems.kernels import ready_conditions
-from coop_drake.systems.motion import STAMPED
+from coop_drake.systems.passing import STAMPED
 from tests.support.motions import motion_under_budget
 from tests.support.readiness import margin_of
 from tests.support.small_loop import governed_cells, small_maps
