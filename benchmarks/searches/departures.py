@@ -63,7 +63,7 @@ class BoundedDepartures:
         yield from (f"share of {name}" for name in _SHARES)
         yield "model_error"
         yield from _DELAYS
-        if self.budget.rubs:
+        if self.budget.joint_coulomb > 0.0 or self.budget.joint_viscous > 0.0:
             yield "joint_friction"
         yield from (f"{START}{axis}" for axis in ("x", "y", "theta"))
         yield from (f"{START}joint {i}" for i in range(len(self._tree.joints)))

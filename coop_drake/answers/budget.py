@@ -146,7 +146,7 @@ class Budget:
         return 1.0 / self.control_rate
 
     def effort_limits(self, joints: int) -> list[float]:
-        """Return the limits of all efforts in the order of ``Tolerance.effort``, infinite for no limit."""
+        """Return the limits of all efforts in the order of ``Departures.effort``, infinite for no limit."""
         counts = self.robots, self.robots, joints
         limits = [inf if getattr(self, name) is None else getattr(self, name) for name in LIMITS]
         return [limit for limit, count in zip(limits, counts, strict=True) for _ in range(count)]
@@ -168,11 +168,6 @@ class Budget:
     def words_window(self) -> float:
         """W, the time in which what one robot says is used by all [s], see ``laws/words.py``."""
         return self.report_age + 2.0 * self.clock_error + 2.0 * self.period
-
-    @property
-    def rubs(self) -> bool:
-        """Whether joints have friction."""
-        return self.joint_coulomb > 0.0 or self.joint_viscous > 0.0
 
     @property
     def axis_acceleration_error(self) -> float:

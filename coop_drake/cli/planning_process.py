@@ -6,11 +6,10 @@ In one process the two would take turns: Python's global lock is held while libr
 from __future__ import annotations
 
 import os
-import signal
 import sys
 from collections.abc import Callable
 from contextlib import suppress
-from multiprocessing import Pipe
+from multiprocessing import Pipe, get_context
 from multiprocessing.connection import Connection
 from threading import Thread
 from typing import TYPE_CHECKING, Any, NoReturn, TypeVar
@@ -54,15 +53,21 @@ def beside(work: Callable[[Progress], R], meanwhile: Callable[[], object], progr
             return result, kernels.wall_seconds, kernels.cpu_seconds
 
     # No other thread of a command holds a lock now, for which the copy could wait for ever.
-    copy = Copy(told)
+    own, theirs = Pipe()
+    copy = get_context("fork").Process(target=_work, args=(told, own, theirs))
+    with uninterrupted():  # Ctrl-C stays blocked in the copy: this process is told, and ends it.
+        copy.start()
+    theirs.close()
     try:
         thread = Thread(target=_quietly, args=(meanwhile,), daemon=True)
         thread.start()
-        result: R = _followed(copy, progress)
+        result: R = _followed(own, progress)
         thread.join()
         return result
     finally:
-        copy.end()
+        own.close()
+        copy.kill()
+        copy.join()
 
 
 def prepare_simulation(scenario: Scenario) -> None:
@@ -87,10 +92,17 @@ def _quietly(meanwhile: Callable[[], object]) -> None:
         meanwhile()
 
 
-def _followed(copy: Copy, progress: Progress) -> Any:
-    """Pass on what the copy says until it sends the result."""
+def _followed(connection: Connection, progress: Progress) -> Any:
+    """Pass on what the copy says until it sends the result.
+
+    Raises:
+        ProcessError: The copy was ended.
+    """
     while True:
-        kind, *content = copy.receive()
+        try:
+            kind, *content = connection.recv()
+        except (EOFError, ConnectionError):
+            raise ProcessError("the process that plans was ended") from None
         if kind == "error":
             raise content[0]
         if kind == "progress":
@@ -104,51 +116,9 @@ def _followed(copy: Copy, progress: Progress) -> Any:
             return result
 
 
-class Copy:
-    """A copy of this process that does some work and ends; it also ends when this process does.
-
-    Its last message is of the kind ``result`` with what the work returned, or ``error`` with what it raised.
-
-    Args:
-        work: Called in the copy with what sends further messages. It shall show nothing; what it changes in
-            the copy is lost.
-
-    Attributes:
-        connection: Where messages come in.
-        pid: Number of the process.
-    """
-
-    def __init__(self, work: Callable[[Send], object]) -> None:
-        self.connection, theirs = Pipe()
-        with uninterrupted():
-            self.pid = os.fork()
-            if self.pid == 0:  # Ctrl-C stays blocked here: the process that was copied is told.
-                self.connection.close()
-                _work(work, theirs)
-        theirs.close()
-
-    def receive(self) -> tuple[Any, ...]:
-        """Wait for the next message, and return its kind and what belongs to it.
-
-        Raises:
-            ProcessError: The copy was ended.
-        """
-        try:
-            message: tuple[Any, ...] = self.connection.recv()
-        except (EOFError, ConnectionError):
-            raise ProcessError("the process that plans was ended") from None
-        return message
-
-    def end(self) -> None:
-        """End the copy, if it has not ended."""
-        self.connection.close()
-        with suppress(ProcessLookupError):
-            os.kill(self.pid, signal.SIGKILL)
-        os.waitpid(self.pid, 0)
-
-
-def _work(work: Callable[[Send], object], connection: Connection) -> NoReturn:
+def _work(work: Callable[[Send], object], parents: Connection, connection: Connection) -> NoReturn:
     """Do the work, send what comes of it, and end; end before if the other process does."""
+    parents.close()
 
     def watch() -> None:
         with suppress(EOFError, OSError):

@@ -14,6 +14,7 @@ from coop_drake.compiled_loop.preparing import NO_SCHEDULE, CompiledTransport
 from coop_drake.diagram.deployment import (
     clock_shift,
     effort_limits,
+    interval_of,
     measurement_deviations,
     measurement_waves,
     seed_of,
@@ -26,7 +27,7 @@ from coop_drake.laws.readiness import departing_name, mean_samples
 from coop_drake.laws.robot_dynamics import INERTIA, MASS
 from coop_drake.laws.words import WORD_SIZE, first_motion, first_words
 from coop_drake.plant.team import displacement
-from coop_drake.scenario import Deafness, Deployment, Silence
+from coop_drake.scenario import Deployment
 from coop_drake.systems.block import READY_SIZE
 from coop_drake.systems.forces import world_departures
 from coop_drake.systems.measurements import LONG_AGO
@@ -117,14 +118,8 @@ def _silences(deployment: Deployment, names: tuple[str, ...]) -> FloatArray:
     for k, name in enumerate(names):
         own = deployment.of_robot(name)
         motors = 0.0 if own.silence is None else _MOTORS[own.silence.motors]
-        rows[k] = (*_interval(own.silence), motors, *_interval(own.deaf))
+        rows[k] = (*interval_of(own.silence), motors, *interval_of(own.deaf))
     return np.array(rows).T.copy()
-
-
-def _interval(one: Silence | Deafness | None) -> tuple[float, float]:
-    if one is None:
-        return inf, inf
-    return one.begin, inf if one.duration is None else one.begin + one.duration
 
 
 def believed(team: arrays.LoopTeam, mass_error: float) -> arrays.LoopTeam:

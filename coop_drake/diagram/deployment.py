@@ -79,12 +79,13 @@ def radio_of(deployment: Deployment, names: Sequence[str], row: int) -> systems.
         seeds=[seed_of(deployment, row, WORD_USE + sender) for sender in range(1 + robots)],
         clock_error=own[row].clock_error + (clock_shift(deployment, row) if row < robots else 0.0),
         offset=own[row].sample_offset,
-        deaf=_interval(own[row].deaf),
-        mute=_interval(own[row].silence),
+        deaf=interval_of(own[row].deaf),
+        mute=interval_of(own[row].silence),
     )
 
 
-def _interval(fault: Silence | Deafness | None) -> tuple[float, float]:
+def interval_of(fault: Silence | Deafness | None) -> tuple[float, float]:
+    """Return begin and end of a fault [s], infinite where there is none or it does not end."""
     if fault is None:
         return inf, inf
     return fault.begin, inf if fault.duration is None else fault.begin + fault.duration

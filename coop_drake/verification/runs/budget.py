@@ -67,7 +67,7 @@ class Largest(NamedTuple):
 def check_budget_used(rows: Rows) -> list[Check]:
     """Check what a plan's budget states against the run; nothing for a plan without a budget."""
     checks = []
-    for one in stated_departures(rows):
+    for one in departures_of_run(rows):
         held, values = np.ones((len(rows.log.times), one.found.shape[1]), dtype=np.bool_), []
         for array in (one.found, one.stated):
             values.append(np.zeros(held.shape))
@@ -81,7 +81,7 @@ def check_budget_used(rows: Rows) -> list[Check]:
 def largest_departure(rows: Rows, until: float = inf) -> Largest | None:
     """Return the largest departure of a run until some time [s]; None for a plan without a budget."""
     found = []
-    for one in stated_departures(rows):
+    for one in departures_of_run(rows):
         shares = one.shares[rows.log.times[one.rows] < until]
         if not shares.size:
             continue
@@ -97,7 +97,7 @@ def budget_share(rows: Rows) -> float:
     return nan if largest is None else largest.share
 
 
-def stated_departures(rows: Rows) -> list[Departure]:
+def departures_of_run(rows: Rows) -> list[Departure]:
     """Return all departures about which a plan with a budget states something."""
     if rows.plan.departures is None or rows.plan.motion is None or rows.plan.budget is None:
         return []
