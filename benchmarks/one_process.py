@@ -12,8 +12,8 @@ from coop_drake.answers.plan import Plan
 from coop_drake.apart.membership import Membership, Processes
 from coop_drake.apart.messages import name_of
 from coop_drake.apart.node import MOVES, RETURNS, STANDS, Stillness
+from coop_drake.apart.processes import SupervisorNode
 from coop_drake.apart.robot import RobotNode
-from coop_drake.apart.supervisor import SupervisorNode
 from coop_drake.diagram import brakes_of, build_world, control_period
 from coop_drake.diagram.robot_controller import hold_of, robot_knowledge
 from coop_drake.harmonic_maps import HarmonicMap

@@ -89,7 +89,7 @@ class BoundedDepartures:
         values["deployment.measurements.delay"] = budget.delay * given["delay"]
         values["deployment.actuators.lag"] = budget.lag * (_LEAST_LAG + (1.0 - _LEAST_LAG) * given["lag"])
         values["deployment.messages.delay"] = budget.report_age * given["report_age"]
-        if budget.rubs:
+        if "joint_friction" in given:
             for name, size in (("coulomb", budget.joint_coulomb), ("viscous", budget.joint_viscous)):
                 values[f"deployment.joint_friction.{name}"] = size * given["joint_friction"]
         return values | self._start(given, budget)

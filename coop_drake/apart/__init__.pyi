@@ -1,5 +1,6 @@
 from .processes import (
     LocalTeam,
+    SupervisorNode,
     network_of,
     robots_of,
     run_node,
@@ -8,7 +9,6 @@ from .processes import (
     wall_clock,
 )
 from .robot import RobotNode
-from .supervisor import SupervisorNode
 
 REJOIN: float
 RESTARTS: int

@@ -1,6 +1,5 @@
 from .component_tree import read_component_tree
-from .facts import run_setup, turning_coupling
-from .planar_model import BaseChain, TeamTree, base_chain, read_team_tree, robot_chain
+from .facts import BaseChain, TeamTree, base_chain, read_team_tree, robot_chain, run_setup, turning_coupling
 from .problem import joint_notes, planning_problem
 from .separate_team import SeparateTeam, build_separate_team
 from .team import (

@@ -21,7 +21,7 @@ from coop_drake.laws.departures import WorldDepartures, act_on_wrenches, without
 from coop_drake.laws.robot_dynamics import end_effector_command, motion_room, robot_effort
 from coop_drake.laws.team_dynamics import stick, sticking_room, team_work
 from coop_drake.plant import RobotPlant, TeamPlant, read_component_tree, read_team_tree, robot_chain
-from coop_drake.plant.planar_model import TeamTree
+from coop_drake.plant.facts import TeamTree
 from coop_drake.scenario import BlockedWheels, Deployment, Floor, JointFriction, WheelSlip
 from coop_drake.systems.block import Block, Law
 from coop_drake.tree.arrays import FloatArray, IntArray

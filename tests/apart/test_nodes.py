@@ -10,8 +10,8 @@ from coop_drake.answers.budget import Budget
 from coop_drake.apart import RobotNode, SupervisorNode
 from coop_drake.apart.messages import AtRest, Begin, Place, Ready, Switch
 from coop_drake.apart.node import ASKS, FOLLOWS, OUTSIDE, RETURNS, STANDS
+from coop_drake.apart.processes import SPARE
 from coop_drake.apart.robot import StampCheck, certified_age
-from coop_drake.apart.supervisor import SPARE
 from coop_drake.diagram import build_station, control_period
 from coop_drake.diagram.robot_controller import robot_knowledge
 from coop_drake.errors import ScenarioError

@@ -12,6 +12,7 @@ from scipy.stats import beta
 from coop_drake.campaign.records import RunRecord, table_of
 from coop_drake.campaign.report import (
     distribution,
+    distributions_svg,
     headline,
     loss_rate,
     make_report,
@@ -20,7 +21,6 @@ from coop_drake.campaign.report import (
     verdict,
     write_report,
 )
-from coop_drake.campaign.report_figures import distributions_svg
 
 
 def run_table(count=200, scenarios=("base", "tight"), tiers=("drake",), lost=(), seed=1):
