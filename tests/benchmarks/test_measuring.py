@@ -58,7 +58,7 @@ def _chatty():
 
 
 def test_a_result_comes_back_with_the_cost_of_the_work_and_not_of_whoever_asked():
-    held = np.ones(40_000_000)
+    held = np.ones(60_000_000)
     done = in_own_process(_chatty, limit=10)
     assert (done.value, done.cpu_seconds < 1.0) == (5.0, True)
     assert 5.0 < done.peak_mb < 1e-6 * held.nbytes
