@@ -1,4 +1,4 @@
-from .clearance import Clearance, TeamClearance
+from .clearance import TeamClearance
 from .maps import accuracy_rows, build_maps
 from .run import configure_simulator, run_loop, simulate
 from .telemetry import (
@@ -14,7 +14,6 @@ from .telemetry import (
 __all__ = [
     "ACCELERATION_TOLERANCE",
     "WRENCH_TOLERANCE",
-    "Clearance",
     "Invariants",
     "Margins",
     "MessageStatistics",

@@ -6,7 +6,6 @@ radii off.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from math import hypot, inf, sqrt
 
 import numpy as np
@@ -130,19 +129,6 @@ def pair_apart(team: TeamArrays, vertices: FloatArray, discs: FloatArray, k: int
     return (-depth if overlap else sqrt(squared)) - radii[0] - radii[1]
 
 
-@dataclass(frozen=True)
-class Clearance:
-    """A smallest distance and where it is.
-
-    Attributes:
-        distance: Signed distance, negative where bodies penetrate [m].
-        place: Between what, for example ``robot_0::base and the walls``.
-    """
-
-    distance: float
-    place: str
-
-
 class TeamClearance:
     """Exact distances of the team's convex pieces to the walls and to each other.
 
@@ -163,15 +149,6 @@ class TeamClearance:
         self.team, self.walls = tree.arrays, np.ascontiguousarray(edges_of(workspace))
         #: The first arguments of ``team_distances`` for this team and floor.
         self.kernel_arguments = self.team, self.walls, *self.team.room()
-
-    def __call__(self, configuration: FloatArray) -> tuple[Clearance, Clearance]:
-        """Return the smallest distance to the walls, and between bodies that must not touch.
-
-        Args:
-            configuration: z = (x, y, theta, q...), shape (3 + n,) [m, rad].
-        """
-        wall, piece, between, pair = team_distances(*self.kernel_arguments, configuration)
-        return Clearance(wall, self.wall_place(piece)), Clearance(between, self.pair_place(pair))
 
     def wall_place(self, piece: int) -> str:
         """Return a phrase for the two sides of a piece's distance to the walls."""

@@ -88,7 +88,7 @@ class TreeJoint:
     A new kind of joint has to be added
 
     - to its plant: ``chain.py`` (``MOVABLE``, which refuses all other kinds), ``component_tree.py`` and
-      ``planar_model.py``, all in ``plant/``;
+      ``facts.py``, all in ``plant/``;
     - to its geometry: ``unit``, poses and levers in this file; ``geometry/sweeps.py`` and ``swept_tree.py``;
     - to the control laws: ``laws/robot_dynamics.py`` (velocities and forces);
     - to the planner: ``answers/problem.py`` (room beyond limits), ``planning/cells/exploration.py``

@@ -21,7 +21,7 @@ from coop_drake.planning import planner
 from coop_drake.plant import build_team_plant, planning_problem
 from coop_drake.plant.problem import body_clearance, wall_clearance
 from coop_drake.simulation import Invariants, build_maps, communication, run, simulate
-from coop_drake.simulation.clearance import TeamClearance
+from coop_drake.simulation.clearance import TeamClearance, team_distances
 from coop_drake.simulation.maps import TOLERANCE
 from coop_drake.simulation.run import joint_limits_kept_by_funnels
 from coop_drake.simulation.telemetry import Sample
@@ -188,7 +188,8 @@ CLEARANCE = TeamClearance(WORKSPACE, TREE)
 @settings(max_examples=60)
 @given(CONFIGURATION)
 def test_distances_are_those_that_shapely_finds_before_a_run(z):
-    (walls, bodies), poses, parts = CLEARANCE(np.array(z)), TREE.poses(z), TREE.components
+    walls, _, bodies, _ = team_distances(*CLEARANCE.kernel_arguments, np.array(z))
+    poses, parts = TREE.poses(z), TREE.components
     to_walls = min(
         wall_clearance(body, pose, WORKSPACE)
         for pose, part in zip(poses, parts, strict=True)
@@ -198,7 +199,7 @@ def test_distances_are_those_that_shapely_finds_before_a_run(z):
         body_clearance(parts[i].bodies[j], poses[i], parts[k].bodies[m], poses[k])
         for (i, j), (k, m) in TREE.collision_pairs
     )
-    for found, expected in ((walls.distance, to_walls), (bodies.distance, between)):
+    for found, expected in ((walls, to_walls), (bodies, between)):
         assert found == pytest.approx(expected, abs=1e-12) if expected > 0.0 else found <= 0.0
 
 
@@ -223,20 +224,21 @@ SQUARE = rectangle(-0.5, 0.5, -0.5, 0.5)
     ],
 )
 def test_clearances_of_one_body_by_hand(room, shape, z, expected):
-    walls, bodies = TeamClearance(room, lone(shape))(np.array(z))
-    assert walls.distance == pytest.approx(expected, abs=1e-12)
-    assert (walls.place, bodies.distance) == ("object and the walls", np.inf)
+    clearance = TeamClearance(room, lone(shape))
+    walls, piece, bodies, _ = team_distances(*clearance.kernel_arguments, np.array(z))
+    assert walls == pytest.approx(expected, abs=1e-12)
+    assert (clearance.wall_place(piece), bodies) == ("object and the walls", np.inf)
 
 
 def test_a_deep_overlap_of_bodies_is_negative_and_named():
     problem = case("base")
     clearance = TeamClearance(problem.workspace, problem.tree)
     z = problem.start.copy()
-    assert clearance(z)[1].distance > 0.0
+    assert team_distances(*clearance.kernel_arguments, z)[2] > 0.0
     z[3:] = (pi - 0.05, 0.0)
-    _, bodies = clearance(z)
-    assert bodies.distance < 0.0
-    assert "robot_0" in bodies.place
+    *_, bodies, pair = team_distances(*clearance.kernel_arguments, z)
+    assert bodies < 0.0
+    assert "robot_0" in clearance.pair_place(pair)
 
 
 def test_a_tree_without_shapes_is_refused():
