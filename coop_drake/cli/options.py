@@ -64,16 +64,12 @@ def complete_gains(context: typer.Context, incomplete: str) -> list[str]:
 
 def _gain_sets(path: Path) -> set[str]:
     """Names as they stand in the file; a file that cannot be read offers none."""
-    import yaml
+    from coop_drake.scenario.document import parse
 
-    class Loader(yaml.SafeLoader):
-        """Reads tags that only Drake's loader knows as plain mappings."""
-
-    Loader.add_multi_constructor("", lambda loader, _, node: loader.construct_mapping(node))
     try:
-        sets = yaml.load(path.read_text(encoding="utf-8"), Loader=Loader)["gains"]["sets"]
-        return {str(name) for name in sets}
-    except (OSError, ValueError, KeyError, TypeError, yaml.YAMLError):
+        content: Any = parse(path.read_text(encoding="utf-8"))
+        return {str(name) for name in content["gains"]["sets"]}
+    except (OSError, ValueError, KeyError, TypeError):
         return set()
 
 
