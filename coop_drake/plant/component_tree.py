@@ -24,7 +24,7 @@ from shapely import MultiPoint, Polygon, box
 from shapely.geometry.base import BaseGeometry
 
 from coop_drake.plant.chain import axis_in_world, limits_of, scoped
-from coop_drake.plant.parsing import bodies_of, joints_of, refusal
+from coop_drake.plant.parsing import bodies_of, refusal
 from coop_drake.plant.team import TeamPlant
 from coop_drake.tree.arrays import FloatArray
 from coop_drake.tree.component_tree import Body, Component, ComponentTree, ConvexShape, PlanarPose, TreeJoint
@@ -234,7 +234,6 @@ class _TreeReader:
         self.context: Context = self.plant.CreateDefaultContext()
         self.plant.SetPositions(self.context, np.zeros(self.plant.num_positions()))
         self.may_overlap = self._may_overlap()
-        self.welds = [j for j in joints_of(self.plant) if j.type_name() == "weld"]
         self.robot_of = {
             int(body.index()): robot.index
             for robot, models in zip(team.robots, team.assembly.robots, strict=True)
@@ -275,19 +274,8 @@ class _TreeReader:
 
     def _welded_to(self, body: RigidBody) -> tuple[RigidBody, ...]:
         """All bodies welded to one, itself included: the object's bodies first, then in the plant's order."""
-        found = {int(body.index()): body}
-        grew = True
-        while grew:
-            grew = False
-            for weld in self.welds:
-                ends = (weld.parent_body(), weld.child_body())
-                inside = [int(end.index()) in found for end in ends]
-                if any(inside) and not all(inside):
-                    found.update({int(end.index()): end for end in ends})
-                    grew = True
-        return tuple(
-            sorted(found.values(), key=lambda b: (self.robot_of.get(int(b.index()), -1), int(b.index())))
-        )
+        welded = self.plant.GetBodiesWeldedTo(body)
+        return tuple(sorted(welded, key=lambda b: (self.robot_of.get(int(b.index()), -1), int(b.index()))))
 
     def _tree_joint(
         self, joint: Joint, index: int, X_WP: RigidTransform, X_WC: RigidTransform, *, outwards: bool
