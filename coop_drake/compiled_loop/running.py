@@ -1,8 +1,7 @@
-"""Runs of the compiled loop: one, or many of one transport, each with departures of its own."""
+"""Runs of the compiled loop: one transport, with departures of its own in each run."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from math import inf, nan, sqrt
 
@@ -177,7 +176,7 @@ def memory_of(transport: CompiledTransport, departures: arrays.LoopDepartures) -
     )
 
 
-# Runs of the compiled loop: one, or many of one transport.
+# One run of the compiled loop.
 
 
 @dataclass(frozen=True)
@@ -275,11 +274,6 @@ def run(
         figures,
     )
     return _outcome(transport, figures, period)
-
-
-def run_many(transport: CompiledTransport, deployments: Iterable[Deployment]) -> Iterator[RunOutcome]:
-    """Run a transport once for each deployment, in their order; arguments and errors as for ``run``."""
-    return (run(transport, deployment) for deployment in deployments)
 
 
 def _outcome(transport: CompiledTransport, figures: FloatArray, period: float) -> RunOutcome:

@@ -13,7 +13,7 @@ from coop_drake.campaign.runs import RunMaker, _times_held
 from coop_drake.campaign.variation import Variation
 from coop_drake.cli.campaign import _compare, _show_both
 from coop_drake.cli.reporter import Reporter
-from coop_drake.compiled_loop import prepare, preparing, run, run_many, with_gains
+from coop_drake.compiled_loop import prepare, preparing, run, with_gains
 from coop_drake.errors import ProcessError, RefusalError, ScenarioError
 from coop_drake.laws import ScheduledGains
 from coop_drake.planning import reschedule
@@ -179,7 +179,7 @@ def test_a_lost_run_ends_where_and_why_it_does_in_drake():
 
 
 def test_the_same_seed_gives_the_same_run_and_another_seed_another_one():
-    runs = run_many(prepared(), [replace(PRESET, seed=seed) for seed in (1, 1, 2)])
+    runs = [run(prepared(), replace(PRESET, seed=seed)) for seed in (1, 1, 2)]
     first, again, other = map(repr, runs)
     assert first == again
     assert first != other
