@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from functools import partial
 from typing import TYPE_CHECKING
 
 from rich.markup import escape
 
 from coop_drake.cli.options import BudgetName, Effort, GainsName, ResultsFolder, ScenarioPath
-from coop_drake.cli.planning_process import beside, prepare_simulation
 from coop_drake.cli.reporter import ExitCode, Reporter
 from coop_drake.cli.results import ResultFolder
 from coop_drake.cli.summary import answer_of, planning_facts, summary_rows
@@ -47,16 +45,15 @@ def plan_of(
     budget: str | None = None,
     *,
     effort: float | None = None,
-    simulated: bool = False,
 ) -> Plan | None:
     """Plan, and note the facts; without a plan say so, and set the exit code.
 
     It holds under the ``budget`` that the option of this name says, or else the scenario's ``deployment``;
     ``effort`` takes the place of the scenario's.
     The plan with its table of cells, a way that limits refuse, or the proof that there is none, goes to the
-    folder if one is given. If the plan will be ``simulated``, this is prepared at the same time.
+    folder if one is given.
     """
-    result = answer_to(task, reporter, budget, effort=effort, simulated=simulated)
+    result = answer_to(task, reporter, budget, effort=effort)
     return report_answer(task, result, folder, reporter)
 
 
@@ -66,7 +63,6 @@ def answer_to(
     budget: str | None = None,
     *,
     effort: float | None = None,
-    simulated: bool = False,
 ) -> PlanningResult:
     """Ask the planner, and note the facts; see ``plan_of``."""
     from coop_drake.memory import peak_memory_mb
@@ -83,15 +79,9 @@ def answer_to(
             reporter.say(f"[yellow]{escape(said)}; `verify` will refuse the plan[/]")
     with reporter.stage("planning", "planning", cpu=True) as progress:
         gain_set = task.scenario.gain_sets[name]
-        work = partial(plan, task.problem, gain_set, gain_set_name=name, budget=tolerated, effort=effort)
-        if simulated:
-            from coop_drake.geometry.polygons import nearest_fraction
-
-            nearest_fraction(0.0, 0.0, 0.0, 0.0, 1.0, 0.0)  # Both processes then have what numba loads first.
-            prepare = partial(prepare_simulation, task.scenario)
-            result = beside(lambda advance: work(progress=advance), prepare, progress)
-        else:
-            result = work(progress=progress)
+        result = plan(
+            task.problem, gain_set, gain_set_name=name, budget=tolerated, effort=effort, progress=progress
+        )
     reporter.facts.update(planning_facts(result), peak_memory_mb=peak_memory_mb())
     return result
 

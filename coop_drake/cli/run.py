@@ -74,7 +74,7 @@ def run_command(
     simulation = simulation_of(task, reporter, apart)
     folder = ResultFolder.of(task.name, out, "plan", "simulation")
     with DrawingProcesses(figures=not options.no_figures) as drawing:
-        if plan := plan_of(task, folder, reporter, effort=effort, simulated=True):
+        if plan := plan_of(task, folder, reporter, effort=effort):
             reporter.code = carry_out(task, plan, folder, reporter, drawing, simulation, options)
 
 
