@@ -34,6 +34,9 @@ NEED_FACTOR = 1.15
 """What an axis needs over its largest estimated rate [-]: the closed loop differs from the estimate by a few
 per cent, and no limit shall act there that need not."""
 
+LARGEST_NEED = 100.0
+"""No speed or rate needs more than this [m/s, rad/s]: limits are shared in proportion to needs."""
+
 ROUNDING = 1e-9
 """Relative difference of sums in another order [-]."""
 
@@ -130,7 +133,7 @@ def _needs(plan: Plan) -> FloatArray:
         shrink = np.maximum(funnel.goal_lower - funnel.slice_lower, funnel.slice_upper - funnel.goal_upper)
         rates = funnel_rate(funnel.decay_rate, shrink, quintic)
         fastest[1:] = np.maximum(fastest[1:], rates / FUNNEL_SHARE)
-    return np.maximum(fastest, RATE_TOLERANCE)
+    return np.clip(fastest, RATE_TOLERANCE, LARGEST_NEED)  # An estimate may grow beyond all numbers.
 
 
 # The accelerations that a plan may command of its joints, and whether the estimated transport needs more.

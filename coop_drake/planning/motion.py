@@ -371,8 +371,8 @@ def quickest_motion(
             last.solve(weights)
             if not last.uniform or last.slow_down() < MUCH_SLOWER:
                 break
-    if not (np.diff(last.windows[:, 1]) > 0.0).all():
-        raise PlanError("a cell is not left after the one before it")
+    if not (np.diff(last.windows, axis=0) > 0.0).all():
+        raise PlanError("a cell is not entered and left after the one before it")
     period = unit * float(last.points[2, -1] - last.points[1, -1])
     made = last.points[:, :-1].copy(), period, period * last.windows, last.kappa / unit
     return Motion(*made, waiting, BRAKE_RAMP, min(last.start_rate / unit, LARGEST_START), gains)
@@ -474,7 +474,9 @@ class _Program:
             while high + 1 < inside.shape[1] and inside[cell, high + 1]:
                 high += 1
             self.first[cell], self.last[cell] = low, high
-        # Robots expect that cells are left one after the other.
+        # Robots expect that cells are entered and left one after the other.
+        for cell in range(1, cells):
+            self.first[cell] = max(self.first[cell], min(self.first[cell - 1] + 1, self.last[cell - 1]))
         for cell in range(cells - 2, -1, -1):
             self.last[cell] = min(self.last[cell], max(self.first[cell + 1], self.last[cell + 1] - 1))
         self.windows = np.stack([self.first, self.last + 1], axis=1) / parts
