@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import shapely
 from scipy.interpolate import BSpline
+from shapely.ops import substring
 
 from coop_drake.answers import Found, PlanningResult, Undecided
 from coop_drake.answers.plan import Cell
@@ -88,6 +89,20 @@ def test_cells_are_left_one_after_the_other_where_several_hold_the_end() -> None
     assert len(motion.windows) == len(cells)
     assert (np.diff(motion.windows, axis=0) > 0.0).all()
     assert motion.windows[-1, 1] == pytest.approx(motion.duration)
+
+
+def test_cells_are_entered_one_after_the_other_where_two_hold_the_start() -> None:
+    scenario, plan = small_motion()
+    assert plan.motion is not None
+    first, way = plan.transitions[0], shapely.LineString(plan.transitions[0].path)
+    parts = [substring(way, *ends, normalized=True) for ends in ((0.0, 0.1), (0.1, 1.0))]
+    halves = [replace(first, path=shapely.get_coordinates(part)) for part in parts]
+    cells, transitions = (plan.cells[0], *plan.cells), (*halves, *plan.transitions[1:])
+    twice = replace(plan, cells=cells, transitions=transitions)
+    problem = planning_problem(scenario)
+    motion = quickest_motion(twice, problem, motion_limits(problem.limits), plan.motion.gains)
+    assert motion.windows[0, 0] == 0.0
+    assert (np.diff(motion.windows, axis=0) > 0.0).all()
 
 
 def test_the_initial_path_along_a_very_long_way_has_few_points() -> None:

@@ -10,18 +10,21 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from shapely import Point, box
 
+from coop_drake.answers import Found
 from coop_drake.answers.plan import check_plan
 from coop_drake.errors import PlanError, StallError
 from coop_drake.geometry import BoundaryDistance
 from coop_drake.laws import FixedGains, ScheduledGains, transition_gains
 from coop_drake.laws.gains import schedule_of
-from coop_drake.planning import Channel, FreeBox, cell_selection, make_plan, plan_time, reschedule
+from coop_drake.planning import Channel, FreeBox, cell_selection, make_plan, plan_time, planner, reschedule
 from coop_drake.planning.cell_selection import Waypoints, cover_path, quickest_plan
 from coop_drake.planning.cells.cells import CellMaker
 from coop_drake.planning.duration import speed_per_clearance, timed, transition_time, travel_time
 from coop_drake.planning.limits import fill
 from coop_drake.planning.search import find_channel
 from coop_drake.planning.transitions import path_through, turned_to_start
+from coop_drake.plant import planning_problem
+from coop_drake.scenario import load_scenario, with_gains
 from paper.governor_run import run_governor
 from tests.support.cases import case
 from tests.support.free_positions import FreePositions
@@ -332,3 +335,13 @@ def test_shares_are_in_proportion_to_needs_until_one_is_held():
     levers, caps = np.array([[1.0, 1.0, 0.0], [1.0, 0.0, 1.0]]), np.array([np.inf, 0.5, np.inf])
     shares = fill(levers, np.array([2.0, 6.0]), caps, np.array([1.0, 1.0, 2.0]))
     assert shares == pytest.approx([1.5, 0.5, 4.5])
+
+
+@pytest.mark.slow
+def test_limits_of_speed_are_numbers_where_the_estimated_transport_has_no_bound():
+    """Table 2 is for another team: in ``three`` its gains ask for rates beyond all numbers."""
+    scenario = with_gains(load_scenario("three"), "table_2")
+    answer = planner.plan(planning_problem(scenario), scenario.gain_sets["table_2"], gain_set_name="table_2")
+    assert isinstance(answer, Found)
+    for transition in answer.plan.transitions:
+        assert not np.isnan(transition.gains.rate_limit).any()
