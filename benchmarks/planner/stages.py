@@ -55,10 +55,10 @@ class Replacement:
     value: Any
 
 
-def _known_path(problem: PlanningProblem, hierarchy: object, known: Any, gap: float, share: float) -> Any:
+def _known_path(problem: PlanningProblem, hierarchy: object, known: Any, share: float) -> Any:
     """Smooth the known path only, as it is smoothed before candidates are compared."""
     moves = band.COMPARED_MOVES
-    return smoothed(problem, known, band.LEAST_CLEARANCE, 0.0, gap, moves=moves)
+    return smoothed(problem, known, band.LEAST_CLEARANCE, 0.0, band.BODY_GAP, moves=moves)
 
 
 def _few_wide_boxes(among: Waypoints) -> IntArray:
