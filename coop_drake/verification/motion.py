@@ -27,7 +27,7 @@ from coop_drake.answers.plan import Plan
 from coop_drake.answers.problem import PlanningProblem
 from coop_drake.errors import RefusalError
 from coop_drake.laws import GainSet, ScheduledGains
-from coop_drake.laws.words import CLOCK_ERROR
+from coop_drake.laws.words import CLOCK_ERROR, WORD_PERIOD
 from coop_drake.robustness.tracking import speed_departures
 from coop_drake.tree.arrays import FloatArray, IntArray
 from coop_drake.verification.budget import check_shapes
@@ -160,8 +160,8 @@ def _check_stops(motion: Motion, waiting: float) -> Check:
     in t is half of that. Where 1 / kappa is less than r, ramps as steep meet before rho' is -kappa, and the
     stop takes 2 sqrt(r / kappa), which is less.
     """
-    if not motion.ramp > 0.0:
-        raise RefusalError("motion.ramp", f"is {motion.ramp} s; expected a positive time")
+    if not motion.ramp >= WORD_PERIOD:
+        raise RefusalError("motion.ramp", f"is {motion.ramp} s; commands change every {WORD_PERIOD:g} s")
     if not motion.waiting >= waiting * (1.0 - RELATIVE):
         raise RefusalError("motion.waiting", f"is {motion.waiting} s; expected {waiting:g} s or more")
     last, least = len(motion.rates) - 1, inf

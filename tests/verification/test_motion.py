@@ -204,6 +204,7 @@ ALTERED = {
     "waits longer": (lambda m: {"waiting": 1.1 * m.waiting}, r"motion\.rates\[0\]"),
     "waits for long": (lambda m: {"waiting": 2.0}, r"motion\.(rates|windows)\[\d+\]"),
     "brakes at once": (lambda m: {"ramp": 0.0}, r"motion\.ramp"),
+    "brakes within a period": (lambda m: {"ramp": 1e-9}, r"motion\.ramp"),
     "brakes more gently": (lambda m: {"ramp": 1.1 * m.ramp}, r"motion\.rates\[0\]"),
     "a shorter period": (lambda m: {"period": 0.99 * m.period}, r"motion\.windows\[END\]"),
     "a longer period": (lambda m: {"period": 1.01 * m.period}, r"motion\.windows\[END\]"),
