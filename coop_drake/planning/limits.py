@@ -197,7 +197,7 @@ def limit_too_low(
 
     Args:
         limits: What the team keeps, see ``PlanningProblem.kept_limits``.
-        seconds: The longest time of a cell within them, infinite where no motion was found [s].
+        seconds: The longest time of a cell within them [s].
         longest: The longest one that is allowed [s].
         slowest: Returns the longest time of a cell within other limits, infinite where there is no motion.
     """

@@ -269,9 +269,12 @@ def _passing(
         age = gain_set.age if isinstance(gain_set, ScheduledGains) else 0.0
         find = partial(quickest_motion, made, problem, gains=pull_gains(age))
         try:
-            motion = find(limits=motion_limits(problem.limits))
+            try:
+                motion = find(limits=motion_limits(problem.limits))
+            except (PlanError, np.linalg.LinAlgError):  # Narrow cells leave less room.
+                find = partial(find, room=np.zeros(len(made.start) - 2))
+                motion = find(limits=motion_limits(problem.limits))
         except (PlanError, np.linalg.LinAlgError) as error:
-            _refuse_low_limits(problem, inf, find)
             raise StallError(
                 f"no motion through its cells without a stop was found: {error}; "
                 "there is a plan for a team that rests in every cell (--gains scheduled)"
@@ -295,7 +298,7 @@ def _refuse_low_limits(problem: PlanningProblem, seconds: float, find: Callable[
 
     Args:
         problem: What was asked.
-        seconds: The longest time of a cell, infinite where there is no motion [s].
+        seconds: The longest time of a cell [s].
         find: Finds the motion within other limits.
     """
     from coop_drake.planning.motion_limits import motion_limits  # Here: it imports scipy.

@@ -14,6 +14,7 @@ from shapely.ops import substring
 from coop_drake.answers import Found, PlanningResult, Undecided
 from coop_drake.answers.plan import Cell
 from coop_drake.laws import ScheduledGains
+from coop_drake.planning import motion as program
 from coop_drake.planning import planner
 from coop_drake.planning.duration import plan_time, timed
 from coop_drake.planning.motion import MOST_SPANS, cell_sets, first_points, first_ways, quickest_motion
@@ -113,6 +114,13 @@ def test_the_initial_path_along_a_very_long_way_has_few_points() -> None:
     assert len(points) < 3 * MOST_SPANS  # 8687 without a bound
     seconds = times_at_limits(chains, 1e-3 * limits, points[:, :-1]).sum()
     assert seconds <= points[-2, -1] <= 2.0 * seconds
+
+
+def test_cells_that_are_too_narrow_for_the_usual_room_leave_less(monkeypatch) -> None:
+    _, problem = planned_motion("base")
+    monkeypatch.setattr(program, "ROOM", 10.0)
+    monkeypatch.setattr(program, "ROOM_SHARE", 0.6)
+    assert isinstance(planner.plan(problem, ScheduledGains(), gain_set_name="scheduled"), Found)
 
 
 def test_slow_teams_take_as_much_longer_as_they_are_slower() -> None:
