@@ -60,6 +60,10 @@ class TeamLimits:
         """Whether there is a limit of a speed or rate."""
         return bool(np.isfinite(np.concatenate((self.base_speeds, self.turn_rates, self.joint_rates))).any())
 
+    def usual(self, joints: int) -> TeamLimits:
+        """Return the usual limits of this team, whatever is stated, for so many joints."""
+        return TeamLimits(self.base_components, self.base_points, bodies=self.bodies).with_defaults(joints)
+
     def with_defaults(self, joints: int | None = None) -> TeamLimits:
         """Return the limits of a team that passes from cell to cell: usual ones where nothing is stated.
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from math import ceil, floor, inf, log10
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -201,8 +200,7 @@ def limit_too_low(
         longest: The longest one that is allowed [s].
         slowest: Returns the longest time of a cell within other limits, infinite where there is no motion.
     """
-    unknown: dict[str, Any] = {name: np.full(getattr(limits, name).shape, np.inf) for name, *_ in _OF_MOTIONS}
-    usual = replace(limits, **unknown).with_defaults()
+    usual = limits.usual(len(limits.joint_rates))
     for name, key, unit, power in _OF_MOTIONS:
         stated, most = getattr(limits, name), getattr(usual, name)
         if not (stated < most).any():

@@ -64,6 +64,7 @@ from coop_drake.planning.motion_barrier import (
 from coop_drake.planning.motion_limits import (
     Chains,
     largest_shares,
+    motion_limits,
     slow_limits,
     team_chains,
     times_at_limits,
@@ -344,7 +345,8 @@ def quickest_motion(
     """
     chains, cells, ways = team_chains(problem), cell_sets(plan, room), first_ways(plan)
     # The program of a slow team is that of a usual one in a longer unit of time.
-    unit, scaled = slow_limits(chains, limits, ways)
+    usual = motion_limits(problem.limits.usual(len(problem.tree.joints)))
+    unit, scaled = slow_limits(chains, limits, usual, ways)
     table = LIMIT_SHARE * scaled
     wait, ramp = waiting / unit, BRAKE_RAMP / unit
     free = np.where([True, True, False], table, inf)  # Jerk is limited where spans are about equal.

@@ -12,7 +12,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from coop_drake.answers import motion as usually
 from coop_drake.answers.motion import GRAVITY
 from coop_drake.answers.problem import PlanningProblem, TeamLimits
 from coop_drake.jit import compiled
@@ -181,20 +180,26 @@ def times_at_limits(chains: Chains, limits: FloatArray, points: FloatArray) -> F
 
 
 FAR_ABOVE = 2.0
-"""Largest limit of a slow team in its unit of time, over the usual one [-]."""
+"""Largest limit of a slow team in its unit of time, over the usual one, or over its own [-]."""
 
 
-def slow_limits(chains: Chains, limits: FloatArray, ways: Sequence[FloatArray]) -> tuple[float, FloatArray]:
+def slow_limits(
+    chains: Chains, limits: FloatArray, usual: FloatArray, ways: Sequence[FloatArray]
+) -> tuple[float, FloatArray]:
     """Return how many times as long ways take within limits as within usual ones, and limits in this unit.
 
     The factor is at least 1. Alone and from rest to rest, a way of length s takes at least s / v,
-    2 sqrt(s / a) and (32 s / j)^(1/3). Limits in a longer unit of time are larger numbers; those that would
+    2 sqrt(s / a) and (32 s / j)^(1/3). Limits in a longer unit of time are larger numbers. Those that would
     be far above the usual ones are ``FAR_ABOVE`` times these, which hardly matters where another is as slow.
 
     Args:
         chains: The bases.
-        limits: See ``motion_limits``.
+        limits: Largest velocities, accelerations and jerks, see ``motion_limits``, shape (P, 3).
+        usual: The usual ones, of the same shape.
         ways: Configurations along them, shape (samples, 3 + n) each.
+
+    Returns:
+        The factor [-], and limits in that many seconds, shape (P, 3).
     """
     lengths = []
     for way in ways:
@@ -202,22 +207,16 @@ def slow_limits(chains: Chains, limits: FloatArray, ways: Sequence[FloatArray]) 
         moved = np.hypot(bases[..., 0], bases[..., 1]).sum(axis=1)
         turned, others = np.abs(bases[..., 2]).sum(axis=1), steps[:, 3:].sum(axis=0)
         lengths.append([np.hypot(*steps[:, :2].T).sum(), *moved, *turned, *others, *moved])
-    usual = np.array(
-        [(inf, usually.OBJECT_ACCELERATION, inf)]
-        + [(usually.BASE_SPEED, usually.BASE_ACCELERATION, usually.BASE_JERK)] * chains.bases
-        + [(usually.TURN_RATE, usually.TURN_ACCELERATION, inf)] * chains.bases
-        + [(usually.JOINT_RATE, usually.JOINT_ACCELERATION, inf)] * (ways[0].shape[1] - 3)
-        + [(inf, usually.FRICTION * usually.GRAVITY, inf)] * chains.bases
-    )[: len(limits)]
     found = np.array(lengths)[:, : len(limits)]
-    least, usually_least = (
+    slow, quick = (
         np.maximum.reduce([found / v, 2.0 * np.sqrt(found / a), np.cbrt(32.0 * found / j)]).max(axis=1).sum()
         for v, a, j in (limits.T, usual.T)
     )
-    unit = float(least / usually_least)
-    if unit <= 1.0:
+    if not slow > quick:
         return 1.0, limits
-    return unit, np.minimum(limits * np.power(unit, [1.0, 2.0, 3.0]), FAR_ABOVE * usual)
+    unit = float(slow / quick)
+    largest = FAR_ABOVE * np.maximum(usual, limits)
+    return unit, np.minimum(limits * np.power(unit, [1.0, 2.0, 3.0]), largest)
 
 
 # What moves, with derivatives.

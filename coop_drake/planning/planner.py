@@ -267,18 +267,18 @@ def _passing(
             with suppress(PatienceError):  # The plan is certified: it gets its motion.
                 progress("planning the motion through all cells", 0.0)
         age = gain_set.age if isinstance(gain_set, ScheduledGains) else 0.0
-        find = partial(quickest_motion, made, problem, gains=pull_gains(age))
-        try:
+        for room in (None, np.zeros(len(made.start) - 2)):  # Narrow cells leave less room.
+            find = partial(quickest_motion, made, problem, gains=pull_gains(age), room=room)
             try:
                 motion = find(limits=motion_limits(problem.limits))
-            except (PlanError, np.linalg.LinAlgError):  # Narrow cells leave less room.
-                find = partial(find, room=np.zeros(len(made.start) - 2))
-                motion = find(limits=motion_limits(problem.limits))
-        except (PlanError, np.linalg.LinAlgError) as error:
+                break
+            except (PlanError, np.linalg.LinAlgError) as error:
+                why = error
+        else:
             raise StallError(
-                f"no motion through its cells without a stop was found: {error}; "
+                f"no motion through its cells without a stop was found: {why}; "
                 "there is a plan for a team that rests in every cell (--gains scheduled)"
-            ) from error
+            ) from why
         _refuse_low_limits(problem, float(cell_times(motion).max()), find)
         made = replace(made, motion=motion)
     assert made.motion is not None  # by both ways

@@ -177,10 +177,8 @@ def _unproved_of_control(plan: Plan) -> str:
         left = "that a team that departs by more than the plan's budget stays in the cells, or by more than "
         left += "docs/budget.md estimates"
     else:
-        left = (
-            "that angles and joints stay in the cells, and so does a position that departs by more than the "
-        )
-        left += "plan's budget"
+        left = "that angles and joints stay in the cells, and a position that departs by more than the plan's"
+        left += " budget"
     if plan.motion is None:
         return left
     jerk = "that jerk is within its limit at every instant (only its mean over each span is checked)"

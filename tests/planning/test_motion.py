@@ -22,6 +22,7 @@ from coop_drake.planning.motion_limits import (
     base_chains,
     base_places,
     motion_limits,
+    slow_limits,
     team_chains,
     times_at_limits,
 )
@@ -114,6 +115,21 @@ def test_the_initial_path_along_a_very_long_way_has_few_points() -> None:
     assert len(points) < 3 * MOST_SPANS  # 8687 without a bound
     seconds = times_at_limits(chains, 1e-3 * limits, points[:, :-1]).sum()
     assert seconds <= points[-2, -1] <= 2.0 * seconds
+
+
+def test_a_team_that_is_hardly_slower_than_usual_keeps_its_larger_limits() -> None:
+    scenario, _ = small_motion()
+    problem = planning_problem(scenario)
+    chains, usual = team_chains(problem), motion_limits(problem.limits.usual(len(problem.tree.joints)))
+    slow = np.zeros(len(usual), bool)
+    slow[5:7] = True  # the joints
+    ways = [np.array([[0.0, 0.0, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 3.0, 0.0]])]
+    limits = np.where(slow[:, None], usual / np.power(1.1, [1.0, 2.0, 3.0]), 5.0 * usual)
+    unit, scaled = slow_limits(chains, limits, usual, ways)
+    assert unit == pytest.approx(1.1)
+    np.testing.assert_allclose(scaled, limits * np.power(unit, [1.0, 2.0, 3.0]))
+    still = [np.zeros((2, 5))]
+    assert slow_limits(chains, limits, usual, still)[0] == 1.0
 
 
 def test_cells_that_are_too_narrow_for_the_usual_room_leave_less(monkeypatch) -> None:
