@@ -71,9 +71,11 @@ def _aimless_plan(*given: Any, targets: object, **others: Any) -> Plan:
     return make_plan(*given, **others)
 
 
-def _motion_along_paths(plan: Plan, problem: PlanningProblem, limits: FloatArray, gains: TeamGains) -> Motion:
+def _motion_along_paths(
+    plan: Plan, problem: PlanningProblem, limits: FloatArray, gains: TeamGains, room: FloatArray | None
+) -> Motion:
     """Return a motion with the times of the first phase if the way is not moved in it, only its times are."""
-    chains, cells, table = team_chains(problem), motion.cell_sets(plan, None), motion.LIMIT_SHARE * limits
+    chains, cells, table = team_chains(problem), motion.cell_sets(plan, room), motion.LIMIT_SHARE * limits
     free, ways = np.where([True, True, False], table, inf), motion.first_ways(plan)
     for finer in range(motion.FINER + 1):
         points = motion.first_points(ways, cells, chains, table, motion.OVERLAP_SPANS * 2**finer)
